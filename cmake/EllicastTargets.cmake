@@ -1,0 +1,20 @@
+# Compile settings shared by every target of the project.
+add_library(ellicast_settings INTERFACE)
+target_include_directories(ellicast_settings INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(ellicast_settings INTERFACE
+  -Wall -Wextra -Wshadow -Wconversion -Wpedantic -Werror
+  # Fused multiply-add and reassociation would make results depend on the compiler's mood.
+  -ffp-contract=off)
+if(ELLICAST_SANITIZE)
+  target_compile_options(ellicast_settings INTERFACE
+    -fsanitize=${ELLICAST_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(ellicast_settings INTERFACE -fsanitize=${ELLICAST_SANITIZE})
+endif()
+
+# ellicast_library(name SOURCES... [PUBLIC deps...] [PRIVATE deps...])
+function(ellicast_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ellicast_settings ${ARG_PRIVATE})
+  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
+endfunction()

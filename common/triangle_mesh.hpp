@@ -1,0 +1,29 @@
+// common/triangle_mesh.hpp
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace ellicast::common {
+
+/// Corners of a triangle as indices into TriangleMesh::positions, counter-clockwise seen from outside.
+using Triangle = std::array<std::uint32_t, 3>;
+
+/// An indexed triangle set. It promises nothing about manifoldness; see common/mesh_topology.hpp for
+/// what can be asked of it. Frame and unit: the model's own.
+struct TriangleMesh {
+    std::vector<Eigen::Vector3d> positions;
+    std::vector<Triangle> triangles;
+};
+
+/// Smallest box that holds all positions; Eigen's empty box when there are none.
+inline Eigen::AlignedBox3d bounding_box(const std::vector<Eigen::Vector3d>& positions) {
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& p : positions) box.extend(p);
+    return box;
+}
+
+}  // namespace ellicast::common

@@ -1,0 +1,196 @@
+// protocol/datagram.hpp
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/result.hpp"
+
+/// Bytes <-> structs of the ellicast wire. protocol/WIRE_FORMAT.md is the law; this header follows it.
+/// No I/O, no clock, no mesh types. All numbers on the wire are big-endian.
+namespace ellicast::protocol {
+
+inline constexpr std::uint8_t kWireVersion = 1;
+inline constexpr std::uint8_t kRtpPayloadType = 96;  // first dynamic type of RFC 3551
+inline constexpr std::uint32_t kRtpClockHz = 90'000;
+inline constexpr std::size_t kMinDatagramBytes = 576;
+inline constexpr std::size_t kDefaultDatagramBytes = 1200;
+inline constexpr std::size_t kMaxDatagramBytes = 65'507;  // largest UDP payload over IPv4
+inline constexpr std::size_t kMaxSections = 8;            // per datagram
+inline constexpr std::uint32_t kMaxEllipsoids = 65'535;
+inline constexpr std::uint32_t kMaxVertices = 1u << 28;
+inline constexpr std::uint32_t kMaxComponents = 1u << 20;
+
+inline constexpr std::size_t kEllipsoidBytes = 36;
+inline constexpr std::size_t kVertexBytes = 12;
+inline constexpr std::size_t kHeaderBytes = 89;         // RTP header, our header and hint
+inline constexpr std::size_t kTrailerBytes = 4;         // CRC-32C
+inline constexpr std::size_t kSectionHeaderBytes = 13;  // of a section of records
+
+using SessionId = std::array<std::uint8_t, 8>;
+using ObjectId = std::array<std::uint8_t, 8>;
+
+/// Centre, then the lower triangle of L row by row: cx cy cz l00 l10 l11 l20 l21 l22. Model units,
+/// frame: the model's minus the description's origin.
+struct EllipsoidRecord {
+    std::array<float, 9> scalars{};
+    bool operator==(const EllipsoidRecord&) const = default;
+};
+
+/// Position x y z; model units, frame as above.
+struct VertexRecord {
+    std::array<float, 3> position{};
+    bool operator==(const VertexRecord&) const = default;
+};
+
+enum class RecordFormat : std::uint8_t { raw = 0 };
+
+/// What every datagram says of the whole object; enough to rebuild it and to check the result. Topology
+/// is that of the boundary of the union of the solid.
+struct Hint {
+    std::array<float, 3> box_min{};
+    std::array<float, 3> box_max{};
+    std::uint32_t components = 1;    // connected surfaces
+    std::int32_t euler_all = 2;      // V - E + F over all components
+    std::int32_t euler_largest = 2;  // of the component with the largest volume
+    std::uint16_t ellipsoids = 0;    // distinct records in the object
+    std::uint32_t vertices = 0;      // distinct records in the object
+    RecordFormat format = RecordFormat::raw;
+    bool approximate = false;  // the promise is not to be judged (overlapping parts, inner shells)
+    bool operator==(const Hint&) const = default;
+};
+
+struct RtpHeader {
+    bool marker = false;  // ends a round; for RTP tools only
+    std::uint8_t payload_type = kRtpPayloadType;
+    std::uint16_t sequence = 0;
+    std::uint32_t timestamp = 0;  // 90 kHz, of sending
+    std::uint32_t ssrc = 0;
+    bool operator==(const RtpHeader&) const = default;
+};
+
+struct DatagramHeader {
+    RtpHeader rtp;
+    SessionId session{};
+    ObjectId object{};
+    Hint hint;
+    std::uint32_t round = 0;      // from 0
+    std::uint32_t rounds = 1;     // in all; 0 = forever
+    std::uint32_t ordinal = 0;    // of this datagram in its round, from 0
+    std::uint32_t datagrams = 1;  // in this round
+    bool operator==(const DatagramHeader&) const = default;
+};
+
+enum class SectionKind : std::uint8_t { ellipsoids = 1, vertices = 2, description = 3 };
+
+/// What is worth knowing but not needed to rebuild. Strings are UTF-8 without control characters, at
+/// most 255 bytes each.
+struct Description {
+    std::string name;                // file stem or what the user gave; not a path
+    std::array<double, 3> origin{};  // add to every position
+    std::string unit;                // "" unknown
+    std::string certificate;         // "" none
+    std::string sender_version;
+    bool operator==(const Description&) const = default;
+};
+
+/// Why a datagram was dropped. Each is counted apart by the receiver; to_string gives the report's key.
+enum class WireError : std::uint8_t {
+    too_short,           // fewer bytes than header and trailer
+    not_rtp,             // RTP version is not 2, or it has padding, an extension or contributing sources
+    unknown_version,     // our version byte is another
+    unsupported_flags,   // a reserved flag (sealed, signed) or an unknown one is set
+    bad_checksum,        // CRC-32C differs
+    bad_hint,            // non-finite or empty box, counts over the limits, impossible topology
+    bad_round,           // ordinal or round outside what the same header says there is
+    bad_section,         // a section runs past the end, or there are more than kMaxSections, or none
+    index_out_of_range,  // a record's index is not below the hinted count, or stride is 0
+    bad_record,          // non-finite, outside the hinted box (5 % slack for centres), bad radius
+    bad_description,     // lengths that run past the end, control characters, non-finite origin
+    kCount
+};
+std::string_view to_string(WireError error);
+
+/// A validated section. Records are decoded on access, from the caller's bytes.
+struct SectionView {
+    SectionKind kind{};
+    std::uint32_t first = 0;   // index of record 0
+    std::uint32_t stride = 1;  // record k has index first + k * stride
+    std::uint16_t count = 0;
+    std::span<const std::uint8_t> body;  // records, or the description's bytes
+
+    /// Requires k < count.
+    [[nodiscard]] std::uint32_t index(std::size_t k) const {
+        return first + static_cast<std::uint32_t>(k) * stride;
+    }
+    /// Requires the kind and k < count (asserted).
+    [[nodiscard]] EllipsoidRecord ellipsoid(std::size_t k) const;
+    [[nodiscard]] VertexRecord vertex(std::size_t k) const;
+    [[nodiscard]] Description description() const;
+};
+
+/// A datagram whose every byte was checked; refers to the bytes it was parsed from. Sections of unknown
+/// kinds are left out.
+struct DatagramView {
+    DatagramHeader header;
+    std::array<SectionView, kMaxSections> section_storage;
+    std::size_t section_count = 0;
+    [[nodiscard]] std::span<const SectionView> sections() const {
+        return {section_storage.data(), section_count};
+    }
+};
+
+/// Checks everything that can be checked without state: see WireError for what, WIRE_FORMAT.md for the
+/// bounds. Never allocates, never throws; linear in the bytes.
+Result<DatagramView, WireError> parse_datagram(std::span<const std::uint8_t> bytes);
+
+/// Bytes of the hint (with its approximate flag) in canonical form, as the object id and the receiver's
+/// grouping hash them.
+inline constexpr std::size_t kCanonicalHintBytes = 44;
+std::array<std::uint8_t, kCanonicalHintBytes> canonical_bytes(const Hint& hint);
+
+/// True when the record alone would pass parse_datagram under this hint. The sender uses it to drop
+/// what no receiver would accept.
+bool acceptable(const EllipsoidRecord& record, const Hint& hint);
+bool acceptable(const VertexRecord& record, const Hint& hint);
+
+/// Builds one datagram of at most `capacity` bytes.
+class DatagramWriter {
+  public:
+    /// Requires kMinDatagramBytes <= capacity <= kMaxDatagramBytes (asserted).
+    DatagramWriter(const DatagramHeader& header, std::size_t capacity);
+
+    /// How many records still fit into a new section (0 when not even its header does).
+    [[nodiscard]] std::size_t ellipsoids_that_fit() const;
+    [[nodiscard]] std::size_t vertices_that_fit() const;
+
+    /// Adds a section of records with indices first, first + stride, ... Requires that they fit, that
+    /// there is at least one, and fewer than kMaxSections sections so far (asserted).
+    void add_ellipsoids(std::uint32_t first, std::uint32_t stride,
+                        std::span<const EllipsoidRecord> records);
+    void add_vertices(std::uint32_t first, std::uint32_t stride,
+                      std::span<const VertexRecord> records);
+    /// False, and nothing added, when it does not fit. Strings are cut to 255 bytes at a character's
+    /// border, control characters replaced by '_'.
+    [[nodiscard]] bool add_description(const Description& description);
+
+    /// Appends the checksum and hands the bytes out; the writer is spent.
+    [[nodiscard]] std::vector<std::uint8_t> finish();
+
+  private:
+    std::vector<std::uint8_t> bytes_;
+    std::size_t capacity_;
+    std::size_t sections_ = 0;
+};
+
+/// Rewrites the RTP sequence number and timestamp of a finished datagram, and its checksum. Lets a
+/// sender lay out a round once and stamp it at the moment of sending.
+void stamp(std::span<std::uint8_t> datagram, std::uint16_t sequence, std::uint32_t timestamp);
+
+}  // namespace ellicast::protocol

@@ -1,0 +1,41 @@
+// sender/broadcast_object.hpp
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "protocol/datagram.hpp"
+#include "sender/decomposition.hpp"
+#include "sender/model_preparation.hpp"
+
+namespace ellicast::sender {
+
+/// The records of one model in canonical order: what a record's index counts. Function of its inputs
+/// alone.
+struct BroadcastObject {
+    protocol::ObjectId id{};
+    protocol::Hint hint;
+    protocol::Description description;
+    std::vector<protocol::EllipsoidRecord> ellipsoids;  // order of selection
+    std::vector<protocol::VertexRecord> vertices;       // spatially spread, seeded order
+};
+
+struct ObjectOptions {
+    std::string name;
+    std::uint64_t seed = 1;
+};
+
+/// Turns geometry into records: subtracts the origin (zero unless the box lies far from it; chosen so that
+/// float32 input survives bit for bit), rounds to float32, merges vertices that become equal, orders the
+/// vertices, drops ellipsoids that no receiver would accept, fills hint, id and description.
+BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
+                            const Decomposition& decomposition, const ObjectOptions& options);
+
+/// Seeded stratified order: the k-th prefix of any length is an even sample of the surface. Ranks along a
+/// Morton curve are visited in bit-reversed order, shuffled inside strata by the seed.
+/// Returns a permutation of 0..n-1.
+std::vector<std::uint32_t> spread_order(const std::vector<Eigen::Vector3d>& positions,
+                                        std::uint64_t seed);
+
+}  // namespace ellicast::sender
