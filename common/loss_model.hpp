@@ -35,13 +35,14 @@ struct TraceLoss {
 
 using LossProcess = std::variant<BernoulliLoss, GilbertLoss, TraceLoss>;
 
-/// Parses "bernoulli:P", "gilbert:p,r[,lb[,lg]]" or "trace:FILE"'s FILE content apart: see parse_trace.
-/// Throws std::invalid_argument with a one-line reason that quotes the text. Probabilities lie in [0, 1].
-/// "trace:" is not accepted here because it needs a file; the caller reads it and uses parse_trace.
+/// Parses "bernoulli:P", "gilbert:p,r[,lb[,lg]]" or "trace:FILE"'s FILE content apart: see
+/// parse_trace. Throws std::invalid_argument with a one-line reason that quotes the text.
+/// Probabilities lie in [0, 1]. "trace:" is not accepted here because it needs a file; the caller
+/// reads it and uses parse_trace.
 LossProcess parse_loss(std::string_view text);
 
-/// A trace is a sequence of '0' (arrived) and '1' (lost); white space and lines from '#' are skipped.
-/// Throws std::invalid_argument for anything else, or when nothing remains.
+/// A trace is a sequence of '0' (arrived) and '1' (lost); white space and lines from '#' are
+/// skipped. Throws std::invalid_argument for anything else, or when nothing remains.
 TraceLoss parse_trace(std::string_view content);
 
 /// A seeded sequence of lost / not lost.
@@ -57,9 +58,9 @@ class LossSequence {
     std::size_t position_ = 0;
 };
 
-/// What the impairment options of both programs say. Every probability is per datagram, except those of
-/// ellipsoids and vertices, which act on sections of that kind (protocol-aware callers apply them with
-/// LossSequence themselves).
+/// What the impairment options of both programs say. Every probability is per datagram, except
+/// those of ellipsoids and vertices, which act on sections of that kind (protocol-aware callers
+/// apply them with LossSequence themselves).
 struct ImpairmentOptions {
     double drop = 0.0;                // all datagrams, independent
     double drop_ellipsoids = 0.0;     // sections of ellipsoids
@@ -85,9 +86,9 @@ struct ImpairmentCounts {
     std::uint64_t corrupted = 0;
 };
 
-/// A seeded, clockless network: datagrams go in, those that survive come out, perhaps later, twice or
-/// damaged. Same seed, same input: same output. Each kind of damage draws from its own seeded stream, so
-/// that switching one on does not change what the others do.
+/// A seeded, clockless network: datagrams go in, those that survive come out, perhaps later, twice
+/// or damaged. Same seed, same input: same output. Each kind of damage draws from its own seeded
+/// stream, so that switching one on does not change what the others do.
 class Impairment {
   public:
     explicit Impairment(const ImpairmentOptions& options);
