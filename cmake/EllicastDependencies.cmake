@@ -1,7 +1,7 @@
 # Every library comes from the distribution's packages; nothing is fetched.
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(OpenMesh 9 REQUIRED)
+find_package(OpenMesh REQUIRED)  # 9; its config file states no version
 find_package(Boost 1.74 REQUIRED)
 find_package(CLI11 2.1 REQUIRED)
 find_package(spdlog 1.10 REQUIRED)
