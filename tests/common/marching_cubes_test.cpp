@@ -11,7 +11,9 @@
 namespace ellicast::common {
 namespace {
 
-GridFrame unit_frame(int n) { return {Eigen::Vector3d::Zero(), 1.0, {n, n, n}}; }
+GridFrame unit_frame(int n) {
+    return {Eigen::Vector3d::Zero(), 1.0, {n, n, n}};
+}
 
 std::vector<float> sampled(const GridFrame& frame, double (*f)(const Eigen::Vector3d&)) {
     std::vector<float> values(frame.size());
@@ -58,7 +60,8 @@ TEST_CASE("values that equal the isolevel, and constant runs, give no degenerate
         REQUIRE(analyse_topology(mesh).manifold);
         for (const Triangle& t : mesh.triangles) {
             for (std::size_t i = 0; i < 3; ++i) {
-                const double length = (mesh.positions[t[i]] - mesh.positions[t[(i + 1) % 3]]).norm();
+                const double length =
+                    (mesh.positions[t[i]] - mesh.positions[t[(i + 1) % 3]]).norm();
                 REQUIRE(length > 0.02);
             }
         }
