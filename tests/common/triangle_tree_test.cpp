@@ -133,12 +133,12 @@ TEST_CASE("the closest point never leaves the box of its triangle") {
         const Vector3d a = random_point(random, 1.0);
         const Vector3d b = random_point(random, 1.0);
         Vector3d c = random_point(random, 1.0);
-        if (trial % 2 == 0) c[trial % 3] = a[trial % 3];
+        if (trial % 2 == 0) c[trial % 3] = b[trial % 3];
         const Eigen::AlignedBox3d box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
-        // Just inside an edge or a corner, where rounding would carry the point over.
-        const double near_b = 1.0 - std::pow(10.0, -16.0 * random.uniform());
-        const double near_c = (1.0 - near_b) * random.uniform();
-        const Vector3d x = a + near_b * (b - a) + near_c * (c - a);
+        // Just inside the edge opposite a, where rounding would carry the point over.
+        const double from_a = 1.0 - std::pow(10.0, -10.0 - 6.0 * random.uniform());
+        const double along = random.uniform();
+        const Vector3d x = a + from_a * ((1.0 - along) * (b - a) + along * (c - a));
         REQUIRE(box.contains(closest_point_on_triangle(x, a, b, c).point));
     }
 }
