@@ -9,8 +9,8 @@
 
 namespace ellicast::receiver {
 
-/// What arrived of one object: distinct records in index order. A value; the reconstruction is a function
-/// of it and of its options alone.
+/// What arrived of one object: distinct records in index order. A value; the reconstruction is a
+/// function of it and of its options alone.
 struct ReceivedObject {
     protocol::ObjectId id{};
     protocol::Hint hint;

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <span>
 #include <stdexcept>
 #include <string>
 
 #include "common/object_id.hpp"
 #include "common/random.hpp"
+#include "protocol/object_table.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -119,16 +119,6 @@ void set_box(protocol::Hint& hint, const std::vector<protocol::VertexRecord>& re
     }
 }
 
-template <std::size_t N>
-void append_big_endian(std::vector<std::uint8_t>& bytes, const std::array<float, N>& values) {
-    for (const float value : values) {
-        const auto bits = std::bit_cast<std::uint32_t>(value);
-        for (int shift = 24; shift >= 0; shift -= 8) {
-            bytes.push_back(static_cast<std::uint8_t>(bits >> shift));
-        }
-    }
-}
-
 void check(const BroadcastObject& object) {
     if (object.vertices.empty()) throw std::invalid_argument("the model has no vertices to send");
     if (object.vertices.size() > protocol::kMaxVertices) {
@@ -183,31 +173,6 @@ std::vector<std::uint32_t> morton_order(const std::vector<Eigen::Vector3d>& posi
 
 }  // namespace
 
-protocol::ObjectId object_id(const protocol::Hint& hint,
-                             std::span<const protocol::EllipsoidRecord> ellipsoids,
-                             std::span<const protocol::VertexRecord> vertices) {
-    constexpr std::size_t kChunk = 1 << 16;  // bytes hashed at a time
-    common::Digest digest;
-    std::vector<std::uint8_t> bytes;
-    bytes.reserve(kChunk + protocol::kEllipsoidBytes);
-    const auto flush = [&](std::size_t least) {
-        if (bytes.size() < least) return;
-        digest.update(bytes);
-        bytes.clear();
-    };
-    for (const protocol::EllipsoidRecord& record : ellipsoids) {
-        append_big_endian(bytes, record.scalars);
-        flush(kChunk);
-    }
-    for (const protocol::VertexRecord& record : vertices) {
-        append_big_endian(bytes, record.position);
-        flush(kChunk);
-    }
-    flush(1);
-    digest.update(protocol::canonical_bytes(hint));  // the record format is part of it
-    return digest.finish8();
-}
-
 BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
                             const Decomposition& decomposition, const ObjectOptions& options) {
     BroadcastObject object;
@@ -246,7 +211,8 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
                                     " ellipsoids");
     }
     object.hint.ellipsoids = static_cast<std::uint16_t>(object.ellipsoids.size());
-    object.id = object_id(object.hint, object.ellipsoids, object.vertices);
+    object.id =
+        protocol::object_id_of<common::Digest>(object.hint, object.ellipsoids, object.vertices);
     return object;
 }
 

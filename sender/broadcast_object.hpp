@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -35,13 +34,6 @@ struct ObjectOptions {
 /// what the wire can say.
 BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
                             const Decomposition& decomposition, const ObjectOptions& options);
-
-/// First 8 bytes of BLAKE2b over the canonical record table (ellipsoids, then vertices, in index
-/// order, as raw big-endian records) and the canonical bytes of the hint, which end in the record
-/// format.
-protocol::ObjectId object_id(const protocol::Hint& hint,
-                             std::span<const protocol::EllipsoidRecord> ellipsoids,
-                             std::span<const protocol::VertexRecord> vertices);
 
 /// Seeded stratified order: the k-th prefix of any length is an even sample of the surface. Ranks
 /// along a Morton curve are visited in bit-reversed order, shuffled inside strata by the seed. Any
