@@ -24,6 +24,7 @@ struct MeshDistance {
     double mean_from_reference = 0;
     double max = 0;  // over samples and vertices of both, both ways
 <<<<<<< HEAD
+<<<<<<< HEAD
     double normal_deg =
         0;  // mean angle, area-weighted, between a sample's and its closest triangle's normal
 =======
@@ -31,6 +32,11 @@ struct MeshDistance {
     // The larger of the two directions. Zero-area triangles have no normal and are left out.
     double normal_deg = 0;
 >>>>>>> measure
+=======
+    // Mean angle between a sample's and its closest triangle's normal; samples are even in area.
+    // The larger of the two directions. Zero-area triangles have no normal and are left out.
+    double normal_deg = 0;
+>>>>>>> send
 
     [[nodiscard]] double rms() const {
         return rms_to_reference > rms_from_reference ? rms_to_reference : rms_from_reference;

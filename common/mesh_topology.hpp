@@ -39,12 +39,18 @@ MeshTopology analyse_topology(const TriangleMesh& mesh);
 std::vector<std::uint32_t> triangle_components(const TriangleMesh& mesh);
 
 <<<<<<< HEAD
+<<<<<<< HEAD
 =======
+=======
+>>>>>>> send
 /// Smallest box that holds all triangles, whatever unreferenced vertices there are; Eigen's empty
 /// box when there is no triangle.
 Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh);
 
+<<<<<<< HEAD
 >>>>>>> measure
+=======
+>>>>>>> send
 /// Signed volume by the divergence theorem; positive for outward orientation. Meaningful when
 /// closed.
 double signed_volume(const TriangleMesh& mesh);
