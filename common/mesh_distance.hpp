@@ -20,8 +20,9 @@ struct MeshDistance {
     double rms_from_reference = 0;  // samples of the reference to the mesh
     double mean_to_reference = 0;
     double mean_from_reference = 0;
-    double max = 0;         // over samples and vertices of both, both ways
-    double normal_deg = 0;  // mean angle, area-weighted, between a sample's and its closest triangle's normal
+    double max = 0;  // over samples and vertices of both, both ways
+    double normal_deg =
+        0;  // mean angle, area-weighted, between a sample's and its closest triangle's normal
 
     [[nodiscard]] double rms() const {
         return rms_to_reference > rms_from_reference ? rms_to_reference : rms_from_reference;
