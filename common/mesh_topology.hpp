@@ -1,6 +1,8 @@
 // common/mesh_topology.hpp
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -35,6 +37,10 @@ MeshTopology analyse_topology(const TriangleMesh& mesh);
 
 /// Component of every triangle (edge-connected), numbered from 0 in order of first triangle.
 std::vector<std::uint32_t> triangle_components(const TriangleMesh& mesh);
+
+/// Smallest box that holds all triangles, whatever unreferenced vertices there are; Eigen's empty
+/// box when there is no triangle.
+Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh);
 
 /// Signed volume by the divergence theorem; positive for outward orientation. Meaningful when
 /// closed.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -40,6 +41,10 @@ class TriangleTree {
         const Eigen::Vector3d& x,
         double max_squared_distance = std::numeric_limits<double>::infinity()) const;
 
+    /// All triangles whose bounding boxes meet or touch `box`, ascending, into `triangles` (what
+    /// was in there goes; the caller keeps the vector from query to query to save allocations).
+    void find_meeting(const Eigen::AlignedBox3d& box, std::vector<std::uint32_t>& triangles) const;
+
     [[nodiscard]] bool empty() const { return corners_.empty(); }
 
   private:
@@ -48,6 +53,10 @@ class TriangleTree {
         std::uint32_t first = 0;  // leaf: first triangle slot; inner: right child
         std::uint32_t count = 0;  // 0: inner node, left child follows it
     };
+    struct Builder;
+
+    void test_leaf(const Node& leaf, const Eigen::Vector3d& x, Hit& best) const;
+
     std::vector<Node> nodes_;
     std::vector<std::array<Eigen::Vector3d, 3>> corners_;  // by slot
     std::vector<std::uint32_t> triangle_of_slot_;
