@@ -107,6 +107,7 @@ struct ImpairmentCounts {
 /// or damaged. Same seed, same input: same output. Each kind of damage draws from its own seeded
 <<<<<<< HEAD
 <<<<<<< HEAD
+<<<<<<< HEAD
 /// stream, so that switching one on does not change what the others do.
 =======
 /// stream, and the same amount for every datagram offered, lost or not, so that switching one on
@@ -118,6 +119,11 @@ struct ImpairmentCounts {
 /// does not change what the others do to a datagram. Damaged first, then doubled; both copies are
 /// held back together.
 >>>>>>> send
+=======
+/// stream, and the same amount for every datagram offered, lost or not, so that switching one on
+/// does not change what the others do to a datagram. Damaged first, then doubled; both copies are
+/// held back together.
+>>>>>>> recv
 class Impairment {
   public:
     explicit Impairment(const ImpairmentOptions& options);

@@ -25,6 +25,7 @@ struct MeshDistance {
     double max = 0;  // over samples and vertices of both, both ways
 <<<<<<< HEAD
 <<<<<<< HEAD
+<<<<<<< HEAD
     double normal_deg =
         0;  // mean angle, area-weighted, between a sample's and its closest triangle's normal
 =======
@@ -37,6 +38,11 @@ struct MeshDistance {
     // The larger of the two directions. Zero-area triangles have no normal and are left out.
     double normal_deg = 0;
 >>>>>>> send
+=======
+    // Mean angle between a sample's and its closest triangle's normal; samples are even in area.
+    // The larger of the two directions. Zero-area triangles have no normal and are left out.
+    double normal_deg = 0;
+>>>>>>> recv
 
     [[nodiscard]] double rms() const {
         return rms_to_reference > rms_from_reference ? rms_to_reference : rms_from_reference;

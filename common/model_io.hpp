@@ -20,6 +20,7 @@ class ModelError : public std::runtime_error {
 
 <<<<<<< HEAD
 <<<<<<< HEAD
+<<<<<<< HEAD
 /// Reads a model file: PLY (ascii, both binary orders), OBJ, OFF, STL, by extension (any case),
 /// through OpenMesh with an importer of our own that keeps polygons as they are, non-manifold ones
 /// too. Polygons are triangulated (fans from the corner that gives the best shapes; degenerate ones
@@ -30,6 +31,8 @@ class ModelError : public std::runtime_error {
 =======
 =======
 >>>>>>> send
+=======
+>>>>>>> recv
 /// Reads a model file: PLY (ascii, both binary orders), OBJ, OFF (text), STL (both), by extension
 /// (any case), through OpenMesh with an importer of our own that keeps polygons as they are,
 /// non-manifold ones too. Polygons are triangulated (fans from the corner that gives the best
@@ -41,9 +44,12 @@ class ModelError : public std::runtime_error {
 /// not finite (or beyond float32), a face index out of range, a face of more than 2048 corners.
 /// Cost: linear; memory a small multiple of the file.
 <<<<<<< HEAD
+<<<<<<< HEAD
 >>>>>>> measure
 =======
 >>>>>>> send
+=======
+>>>>>>> recv
 TriangleMesh read_model(const std::filesystem::path& path);
 
 /// The same for the bytes of a file, `extension` as in ".ply". ModelError gives only the reason.
@@ -64,6 +70,7 @@ struct PlyOptions {
 /// Writes a binary little-endian PLY through a temporary beside it and a rename, so that a reader
 <<<<<<< HEAD
 <<<<<<< HEAD
+<<<<<<< HEAD
 /// never sees half a file. Same input, same bytes. Throws ModelError (path and reason).
 =======
 /// never sees half a file. Same input, same bytes. Throws ModelError (path and reason); a position
@@ -75,6 +82,11 @@ struct PlyOptions {
 /// that is not finite in the written type is a reason. Requires one value per vertex in each
 /// property (asserted).
 >>>>>>> send
+=======
+/// never sees half a file. Same input, same bytes. Throws ModelError (path and reason); a position
+/// that is not finite in the written type is a reason. Requires one value per vertex in each
+/// property (asserted).
+>>>>>>> recv
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
                const PlyOptions& options = {});
 
