@@ -1,6 +1,7 @@
 // protocol/acceptance.cpp
 #include "protocol/acceptance.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "protocol/byte_reader.hpp"
@@ -76,9 +77,9 @@ RecordBounds::RecordBounds(const Hint& hint) {
         center_min_[axis] = static_cast<double>(hint.box_min[axis]) - kCenterSlack * diagonal;
         center_max_[axis] = static_cast<double>(hint.box_max[axis]) + kCenterSlack * diagonal;
     }
-    for (std::size_t k = 0; k < 3 * kBlock; ++k) {
-        vertex_min_[k] = hint.box_min[k % 3];
-        vertex_max_[k] = hint.box_max[k % 3];
+    for (std::size_t k = 0; k < kBoxBlock; k += 3) {
+        std::copy(hint.box_min.begin(), hint.box_min.end(), vertex_min_.data() + k);
+        std::copy(hint.box_max.begin(), hint.box_max.end(), vertex_max_.data() + k);
     }
 }
 
@@ -112,19 +113,12 @@ bool RecordBounds::admits_ellipsoids(const std::uint8_t* records, std::size_t co
 }
 
 bool RecordBounds::admits_vertices(const std::uint8_t* records, std::size_t count) const {
-    // Blocks of 12 numbers: no branch inside, so that the compiler compares several at once.
-    std::size_t k = 0;
-    std::uint32_t outside = 0;
-    for (; k + kBlock <= count; k += kBlock) {
-        const std::uint8_t* p = records + k * kVertexBytes;
-        for (std::size_t j = 0; j < 3 * kBlock; ++j) {
-            const float x = load_f32(p + 4 * j);
-            outside |= static_cast<std::uint32_t>(!(x >= vertex_min_[j])) |
-                       static_cast<std::uint32_t>(!(x <= vertex_max_[j]));
-        }
+    constexpr std::size_t kBlock = kBoxBlock / 3;
+    const std::size_t blocks = count / kBlock;
+    bool ok = all_inside(records, blocks, vertex_min_, vertex_max_);
+    for (std::size_t k = blocks * kBlock; k < count; ++k) {
+        ok &= admits(load_vertex(records + k * kVertexBytes));
     }
-    bool ok = outside == 0;
-    for (; k < count; ++k) ok &= admits(load_vertex(records + k * kVertexBytes));
     return ok;
 }
 
