@@ -46,7 +46,7 @@ bool topology_is_possible(const Hint& hint) {
 /// So every allowed ellipsoid passes, and what passes has radii within [kMinRadius / sqrt 3, sqrt
 /// 3].
 bool radii_are_plausible(double l00, double l10, double l11, double l20, double l21, double l22) {
-    const bool positive = (l00 > 0.0) & (l11 > 0.0) & (l22 > 0.0);
+    const bool positive = l00 > 0.0 && l11 > 0.0 && l22 > 0.0;
     const double norm_L = l00 * l00 + l10 * l10 + l11 * l11 + l20 * l20 + l21 * l21 + l22 * l22;
     const double a00 = l11 * l22;
     const double a11 = l00 * l22;
@@ -58,7 +58,7 @@ bool radii_are_plausible(double l00, double l10, double l11, double l20, double 
     const double det = a22 * l22;
     constexpr double kLimit = 3.0 * (1.0 + 1e-6) * (1.0 + 1e-6);
     constexpr double kInverseLimit = kLimit / (kMinRadius * kMinRadius);
-    return positive & (norm_L <= kLimit) & (norm_adj <= kInverseLimit * (det * det));
+    return positive && norm_L <= kLimit && norm_adj <= kInverseLimit * (det * det);
 }
 
 }  // namespace
@@ -88,18 +88,18 @@ bool RecordBounds::admits(const EllipsoidRecord& record) const {
     bool inside = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const double c = static_cast<double>(s[axis]);
-        inside &= (c >= center_min_[axis]) & (c <= center_max_[axis]);
+        inside &= c >= center_min_[axis] && c <= center_max_[axis];
     }
     std::array<double, 6> l{};
     for (std::size_t k = 0; k < 6; ++k) l[k] = static_cast<double>(s[3 + k]) * per_diagonal_;
-    return inside & radii_are_plausible(l[0], l[1], l[2], l[3], l[4], l[5]);
+    return inside && radii_are_plausible(l[0], l[1], l[2], l[3], l[4], l[5]);
 }
 
 bool RecordBounds::admits(const VertexRecord& record) const {
     bool inside = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const float x = record.position[axis];
-        inside &= (x >= vertex_min_[axis]) & (x <= vertex_max_[axis]);
+        inside &= x >= vertex_min_[axis] && x <= vertex_max_[axis];
     }
     return inside;
 }
