@@ -1,8 +1,10 @@
 // common/mesh_distance.hpp
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "common/triangle_mesh.hpp"
 
@@ -20,8 +22,10 @@ struct MeshDistance {
     double rms_from_reference = 0;  // samples of the reference to the mesh
     double mean_to_reference = 0;
     double mean_from_reference = 0;
-    double max = 0;         // over samples and vertices of both, both ways
-    double normal_deg = 0;  // mean angle, area-weighted, between a sample's and its closest triangle's normal
+    double max = 0;  // over samples and vertices of both, both ways
+    // Mean angle between a sample's and its closest triangle's normal; samples are even in area.
+    // The larger of the two directions. Zero-area triangles have no normal and are left out.
+    double normal_deg = 0;
 
     [[nodiscard]] double rms() const {
         return rms_to_reference > rms_from_reference ? rms_to_reference : rms_from_reference;
@@ -31,9 +35,23 @@ struct MeshDistance {
     }
 };
 
-/// Area-stratified samples: triangle areas are accumulated in index order, sample k lies at area
-/// (k + jitter_k) / n, uniform inside its triangle. Closest points are exact (TriangleTree).
-/// Requires both to have a triangle of positive area; throws std::invalid_argument otherwise.
+/// A point of a surface and the triangle it was taken from.
+struct SurfaceSample {
+    Eigen::Vector3d point = Eigen::Vector3d::Zero();
+    std::uint32_t triangle = 0;
+};
+
+/// `count` area-stratified samples: triangle areas are accumulated in index order, sample k lies at
+/// area (k + jitter_k) / count, uniform inside its triangle. Zero-area triangles get none. Same
+/// input, same bits. Throws std::invalid_argument when the area is zero or not finite. Linear.
+std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t count,
+                                          std::uint64_t seed);
+
+/// Distances of samples and of referenced vertices of either surface to the other. Samples as
+/// sample_surface() takes them, with the same seed on both, so that swapping the two surfaces swaps
+/// the two directions. Closest points are exact (TriangleTree). Requires both to have a triangle of
+/// positive area, finite positions and at least one sample; throws std::invalid_argument otherwise.
+/// Cost: samples and vertices times the logarithm of the other mesh.
 MeshDistance measure_distance(const TriangleMesh& mesh, const TriangleMesh& reference,
                               const MeshDistanceOptions& options = {});
 

@@ -1,6 +1,8 @@
 // common/mesh_topology.hpp
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -9,8 +11,8 @@
 
 namespace ellicast::common {
 
-/// What can be said of a triangle set from its indices alone (volumes apart). Unreferenced vertices do
-/// not count.
+/// What can be said of a triangle set from its indices alone (volumes apart). Unreferenced vertices
+/// do not count.
 struct MeshTopology {
     std::size_t vertices = 0;  // referenced ones
     std::size_t edges = 0;
@@ -21,8 +23,8 @@ struct MeshTopology {
     std::size_t components = 0;             // connected by edges
     std::int64_t euler = 0;                 // V - E + F
     std::int64_t euler_largest = 0;         // of the component with the largest |volume|
-    bool closed = false;    // at least one face, no boundary edge
-    bool manifold = false;  // no non-manifold edge or vertex (boundary allowed)
+    bool closed = false;                    // at least one face, no boundary edge
+    bool manifold = false;                  // no non-manifold edge or vertex (boundary allowed)
 
     /// Genus in all, components - euler / 2; meaningful for a closed manifold.
     [[nodiscard]] std::int64_t genus() const {
@@ -36,11 +38,16 @@ MeshTopology analyse_topology(const TriangleMesh& mesh);
 /// Component of every triangle (edge-connected), numbered from 0 in order of first triangle.
 std::vector<std::uint32_t> triangle_components(const TriangleMesh& mesh);
 
-/// Signed volume by the divergence theorem; positive for outward orientation. Meaningful when closed.
+/// Smallest box that holds all triangles, whatever unreferenced vertices there are; Eigen's empty
+/// box when there is no triangle.
+Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh);
+
+/// Signed volume by the divergence theorem; positive for outward orientation. Meaningful when
+/// closed.
 double signed_volume(const TriangleMesh& mesh);
 
-/// Number of unordered pairs of triangles that share no vertex and intersect (or touch), and the number
-/// of triangles in such pairs. Exact up to double rounding. About n log n by a tree.
+/// Number of unordered pairs of triangles that share no vertex and intersect (or touch), and the
+/// number of triangles in such pairs. Exact up to double rounding. About n log n by a tree.
 struct SelfIntersections {
     std::size_t pairs = 0;
     std::size_t faces = 0;

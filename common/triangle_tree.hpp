@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -11,8 +12,8 @@
 
 namespace ellicast::common {
 
-/// Closest point of triangle abc to x ([E05] section 5.1.5), with barycentric coordinates of a, b, c.
-/// Degenerate triangles are treated as the segment or point they are.
+/// Closest point of triangle abc to x ([E05] section 5.1.5), with barycentric coordinates of a, b,
+/// c. Degenerate triangles are treated as the segment or point they are.
 struct TrianglePoint {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
     Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
@@ -20,9 +21,9 @@ struct TrianglePoint {
 TrianglePoint closest_point_on_triangle(const Eigen::Vector3d& x, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
-/// A bounding-volume tree over the triangles of a mesh, for exact closest-point queries. Built once,
-/// deterministic, safe to query from many threads. Keeps its own copy of the corner positions.
-/// Build O(n log n); a query about O(log n). Memory about 120 bytes a triangle.
+/// A bounding-volume tree over the triangles of a mesh, for exact closest-point queries. Built
+/// once, deterministic, safe to query from many threads. Keeps its own copy of the corner
+/// positions. Build O(n log n); a query about O(log n). Memory about 120 bytes a triangle.
 class TriangleTree {
   public:
     TriangleTree() = default;
@@ -34,20 +35,28 @@ class TriangleTree {
         Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
         double squared_distance = std::numeric_limits<double>::infinity();
     };
-    /// Closest point of all triangles within `max_squared_distance`; ties go to the smallest triangle
-    /// index. hit.triangle is the maximum value when there is none. Requires finite x.
-    [[nodiscard]] Hit closest(const Eigen::Vector3d& x,
-                              double max_squared_distance =
-                                  std::numeric_limits<double>::infinity()) const;
+    /// Closest point of all triangles within `max_squared_distance`; ties go to the smallest
+    /// triangle index. hit.triangle is the maximum value when there is none. Requires finite x.
+    [[nodiscard]] Hit closest(
+        const Eigen::Vector3d& x,
+        double max_squared_distance = std::numeric_limits<double>::infinity()) const;
+
+    /// All triangles whose bounding boxes meet or touch `box`, ascending, into `triangles` (what
+    /// was in there goes; the caller keeps the vector from query to query to save allocations).
+    void find_meeting(const Eigen::AlignedBox3d& box, std::vector<std::uint32_t>& triangles) const;
 
     [[nodiscard]] bool empty() const { return corners_.empty(); }
 
   private:
     struct Node {
-        Eigen::AlignedBox3f box;       // rounded outwards
-        std::uint32_t first = 0;       // leaf: first triangle slot; inner: right child
-        std::uint32_t count = 0;       // 0: inner node, left child follows it
+        Eigen::AlignedBox3f box;  // rounded outwards
+        std::uint32_t first = 0;  // leaf: first triangle slot; inner: right child
+        std::uint32_t count = 0;  // 0: inner node, left child follows it
     };
+    struct Builder;
+
+    void test_leaf(const Node& leaf, const Eigen::Vector3d& x, Hit& best) const;
+
     std::vector<Node> nodes_;
     std::vector<std::array<Eigen::Vector3d, 3>> corners_;  // by slot
     std::vector<std::uint32_t> triangle_of_slot_;
