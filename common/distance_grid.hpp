@@ -10,17 +10,17 @@
 
 namespace ellicast::common {
 
-/// The spatial distance field of [BK02] section 2: at every node the least distance estimate over all
-/// ellipsoids whose padded box holds the node, a length, negative inside. Nodes far from all ellipsoids,
-/// and all nodes on the border of the grid, are `outside`.
+/// The spatial distance field of [BK02] section 2: at every node the least distance estimate over
+/// all ellipsoids whose padded box holds the node, a length, negative inside. Nodes far from all
+/// ellipsoids, and all nodes on the border of the grid, are `outside`.
 struct DistanceGrid {
     GridFrame frame;
     float outside = 0;          // positive
     std::vector<float> values;  // frame.size()
 };
 
-/// Fills the grid. Boxes are padded by 3 spacings, so that values next to the surface are distances on
-/// both sides of it. The least of a set: order and threads do not change a bit of the result.
+/// Fills the grid. Boxes are padded by 3 spacings, so that values next to the surface are distances
+/// on both sides of it. The least of a set: order and threads do not change a bit of the result.
 /// Requires dims >= 2 on each axis (asserted). Cost: nodes in all padded boxes.
 DistanceGrid make_distance_grid(std::span<const Ellipsoid> ellipsoids, const GridFrame& frame,
                                 unsigned threads = 0);

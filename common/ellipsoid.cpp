@@ -37,7 +37,8 @@ std::optional<Ellipsoid> ellipsoid_from_quadric(const Eigen::Matrix4d& Q) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
     if (eigen.info() != Eigen::Success) return std::nullopt;
     const Eigen::Vector3d& lambda = eigen.eigenvalues();
-    // Relative bound: below it the longest axis is over 1e6 times the shortest, numerically a cylinder.
+    // Relative bound: below it the longest axis is over 1e6 times the shortest, numerically a
+    // cylinder.
     if (!(lambda[0] > 1e-12 * lambda[2]) || !(lambda[2] > 0.0)) return std::nullopt;
 
     // Centre: A c + b = 0. Scale: at the centre the form takes its least value, -k.

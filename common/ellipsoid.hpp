@@ -7,21 +7,22 @@
 
 namespace ellicast::common {
 
-/// The solid {center + L u : |u| <= 1}, L lower triangular with positive diagonal. These are the nine
-/// scalars of [BK02] section 1 in a form that no choice of numbers turns into a hyperboloid.
+/// The solid {center + L u : |u| <= 1}, L lower triangular with positive diagonal. These are the
+/// nine scalars of [BK02] section 1 in a form that no choice of numbers turns into a hyperboloid.
 /// Frame: the model's. Units: lengths in model units.
 struct Ellipsoid {
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     Eigen::Matrix3d L = Eigen::Matrix3d::Identity();  // strictly upper part is zero
 };
 
-/// The symmetric 4x4 matrix Q of [BK02] section 2 with [x;1]' Q [x;1] = |L^-1 (x - c)|^2 - 1: negative
-/// inside, zero on the surface, positive outside.
+/// The symmetric 4x4 matrix Q of [BK02] section 2 with [x;1]' Q [x;1] = |L^-1 (x - c)|^2 - 1:
+/// negative inside, zero on the surface, positive outside.
 Eigen::Matrix4d quadric_matrix(const Ellipsoid& ellipsoid);
 
-/// The ellipsoid {x : [x;1]' Q [x;1] <= 0}, whatever positive factor Q carries. Empty when Q is not of
-/// ellipsoid type (the eigenvalues of its upper left 3x3 block not all positive, [BK02] section 3.2),
-/// has no interior, or is not finite. Only the lower triangle of Q's 3x3 block is read.
+/// The ellipsoid {x : [x;1]' Q [x;1] <= 0}, whatever positive factor Q carries. Empty when Q is not
+/// of ellipsoid type (the eigenvalues of its upper left 3x3 block not all positive, [BK02]
+/// section 3.2), has no interior, or is not finite. Only the lower triangle of Q's 3x3 block is
+/// read.
 std::optional<Ellipsoid> ellipsoid_from_quadric(const Eigen::Matrix4d& Q);
 
 /// The three semi-axis lengths, ascending.
@@ -34,8 +35,8 @@ double volume(const Ellipsoid& ellipsoid);
 Eigen::AlignedBox3d bounding_box(const Ellipsoid& ellipsoid);
 
 /// An ellipsoid prepared for many evaluations of the distance estimate s (s - 1) / |A d| with
-/// A = (L L')^-1, d = x - c, s = sqrt(d' A d): a length, negative inside, exact for spheres and to first
-/// order at every surface. At d = 0 it is minus the smallest semi-axis.
+/// A = (L L')^-1, d = x - c, s = sqrt(d' A d): a length, negative inside, exact for spheres and to
+/// first order at every surface. At d = 0 it is minus the smallest semi-axis.
 class EllipsoidDistance {
   public:
     /// Requires a positive diagonal of L (asserted).

@@ -9,9 +9,10 @@
 
 namespace ellicast::common {
 
-/// Calls body(begin, end) on disjoint ranges that together make [0, count), on up to `threads` threads
-/// (0: one per core), and returns when all are done. The body must write only what its own range owns;
-/// then the result does not depend on the number of threads. The first exception thrown is rethrown.
+/// Calls body(begin, end) on disjoint ranges that together make [0, count), on up to `threads`
+/// threads (0: one per core), and returns when all are done. The body must write only what its own
+/// range owns; then the result does not depend on the number of threads. The first exception thrown
+/// is rethrown.
 template <class Body>
 void parallel_for(std::size_t count, unsigned threads, const Body& body) {
     if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());

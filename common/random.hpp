@@ -9,8 +9,8 @@
 
 namespace ellicast::common {
 
-/// SplitMix64 ([SLF14]): a seeded generator whose numbers are the same on every platform and standard
-/// library, unlike the distributions of <random>. Not for secrets.
+/// SplitMix64 ([SLF14]): a seeded generator whose numbers are the same on every platform and
+/// standard library, unlike the distributions of <random>. Not for secrets.
 class Random {
   public:
     explicit Random(std::uint64_t seed) : state_(seed) {}

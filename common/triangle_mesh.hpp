@@ -9,11 +9,12 @@
 
 namespace ellicast::common {
 
-/// Corners of a triangle as indices into TriangleMesh::positions, counter-clockwise seen from outside.
+/// Corners of a triangle as indices into TriangleMesh::positions, counter-clockwise seen from
+/// outside.
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// An indexed triangle set. It promises nothing about manifoldness; see common/mesh_topology.hpp for
-/// what can be asked of it. Frame and unit: the model's own.
+/// An indexed triangle set. It promises nothing about manifoldness; see common/mesh_topology.hpp
+/// for what can be asked of it. Frame and unit: the model's own.
 struct TriangleMesh {
     std::vector<Eigen::Vector3d> positions;
     std::vector<Triangle> triangles;

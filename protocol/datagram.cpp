@@ -1,1 +1,57 @@
+// protocol/datagram.cpp
 #include "protocol/datagram.hpp"
+
+#include <cassert>
+
+#include "protocol/acceptance.hpp"
+#include "protocol/description.hpp"
+
+namespace ellicast::protocol {
+
+std::string_view to_string(WireError error) {
+    switch (error) {
+        case WireError::too_short:
+            return "too_short";
+        case WireError::not_rtp:
+            return "not_rtp";
+        case WireError::unknown_version:
+            return "unknown_version";
+        case WireError::unsupported_flags:
+            return "unsupported_flags";
+        case WireError::bad_checksum:
+            return "bad_checksum";
+        case WireError::bad_hint:
+            return "bad_hint";
+        case WireError::bad_round:
+            return "bad_round";
+        case WireError::bad_section:
+            return "bad_section";
+        case WireError::index_out_of_range:
+            return "index_out_of_range";
+        case WireError::bad_record:
+            return "bad_record";
+        case WireError::bad_description:
+            return "bad_description";
+        case WireError::kCount:
+            break;
+    }
+    assert(false && "not a WireError");
+    return "unknown";
+}
+
+EllipsoidRecord SectionView::ellipsoid(std::size_t k) const {
+    assert(kind == SectionKind::ellipsoids && k < count);
+    return load_ellipsoid(body.data() + k * kEllipsoidBytes);
+}
+
+VertexRecord SectionView::vertex(std::size_t k) const {
+    assert(kind == SectionKind::vertices && k < count);
+    return load_vertex(body.data() + k * kVertexBytes);
+}
+
+Description SectionView::description() const {
+    assert(kind == SectionKind::description);
+    return decode_description(body);
+}
+
+}  // namespace ellicast::protocol

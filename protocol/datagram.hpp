@@ -12,8 +12,8 @@
 
 #include "protocol/result.hpp"
 
-/// Bytes <-> structs of the ellicast wire. protocol/WIRE_FORMAT.md is the law; this header follows it.
-/// No I/O, no clock, no mesh types. All numbers on the wire are big-endian.
+/// Bytes <-> structs of the ellicast wire. protocol/WIRE_FORMAT.md is the law; this header follows
+/// it. No I/O, no clock, no mesh types. All numbers on the wire are big-endian.
 namespace ellicast::protocol {
 
 inline constexpr std::uint8_t kWireVersion = 1;
@@ -26,6 +26,13 @@ inline constexpr std::size_t kMaxSections = 8;            // per datagram
 inline constexpr std::uint32_t kMaxEllipsoids = 65'535;
 inline constexpr std::uint32_t kMaxVertices = 1u << 28;
 inline constexpr std::uint32_t kMaxComponents = 1u << 20;
+
+/// Bounds of plausible geometry. Sixth powers of lengths between kMinRadius * kMinDiagonal and
+/// kMaxCoordinate stay within double, and the lengths themselves within float.
+inline constexpr float kMaxCoordinate = 1e30f;
+inline constexpr double kMinDiagonal = 1e-30;  // of the box
+inline constexpr double kMinRadius = 1e-6;     // of an ellipsoid, in diagonals; the largest is 1
+inline constexpr double kCenterSlack = 0.05;   // of a centre beyond the box, in diagonals
 
 inline constexpr std::size_t kEllipsoidBytes = 36;
 inline constexpr std::size_t kVertexBytes = 12;
@@ -51,8 +58,8 @@ struct VertexRecord {
 
 enum class RecordFormat : std::uint8_t { raw = 0 };
 
-/// What every datagram says of the whole object; enough to rebuild it and to check the result. Topology
-/// is that of the boundary of the union of the solid.
+/// What every datagram says of the whole object; enough to rebuild it and to check the result.
+/// Topology is that of the boundary of the union of the solid.
 struct Hint {
     std::array<float, 3> box_min{};
     std::array<float, 3> box_max{};
@@ -89,8 +96,8 @@ struct DatagramHeader {
 
 enum class SectionKind : std::uint8_t { ellipsoids = 1, vertices = 2, description = 3 };
 
-/// What is worth knowing but not needed to rebuild. Strings are UTF-8 without control characters, at
-/// most 255 bytes each.
+/// What is worth knowing but not needed to rebuild. Strings are UTF-8 without control characters,
+/// at most 255 bytes each.
 struct Description {
     std::string name;                // file stem or what the user gave; not a path
     std::array<double, 3> origin{};  // add to every position
@@ -100,19 +107,20 @@ struct Description {
     bool operator==(const Description&) const = default;
 };
 
-/// Why a datagram was dropped. Each is counted apart by the receiver; to_string gives the report's key.
+/// Why a datagram was dropped. Each is counted apart by the receiver; to_string gives the report's
+/// key.
 enum class WireError : std::uint8_t {
     too_short,           // fewer bytes than header and trailer
-    not_rtp,             // RTP version is not 2, or it has padding, an extension or contributing sources
+    not_rtp,             // RTP version is not 2, or padding, an extension or sources are announced
     unknown_version,     // our version byte is another
     unsupported_flags,   // a reserved flag (sealed, signed) or an unknown one is set
     bad_checksum,        // CRC-32C differs
-    bad_hint,            // non-finite or empty box, counts over the limits, impossible topology
+    bad_hint,            // box not finite or empty, counts over the limits, impossible topology
     bad_round,           // ordinal or round outside what the same header says there is
-    bad_section,         // a section runs past the end, or there are more than kMaxSections, or none
+    bad_section,         // past the end, length against count, no record; none, over kMaxSections
     index_out_of_range,  // a record's index is not below the hinted count, or stride is 0
-    bad_record,          // non-finite, outside the hinted box (5 % slack for centres), bad radius
-    bad_description,     // lengths that run past the end, control characters, non-finite origin
+    bad_record,          // not finite, outside the hinted box (5 % slack for centres), bad radius
+    bad_description,     // lengths that miss the end, control characters, no UTF-8, bad origin
     kCount
 };
 std::string_view to_string(WireError error);
@@ -135,8 +143,8 @@ struct SectionView {
     [[nodiscard]] Description description() const;
 };
 
-/// A datagram whose every byte was checked; refers to the bytes it was parsed from. Sections of unknown
-/// kinds are left out.
+/// A datagram whose every byte was checked; refers to the bytes it was parsed from. Sections of
+/// unknown kinds are left out.
 struct DatagramView {
     DatagramHeader header;
     std::array<SectionView, kMaxSections> section_storage;
@@ -146,21 +154,26 @@ struct DatagramView {
     }
 };
 
-/// Checks everything that can be checked without state: see WireError for what, WIRE_FORMAT.md for the
-/// bounds. Never allocates, never throws; linear in the bytes.
+/// Checks everything that can be checked without state: see WireError for what, WIRE_FORMAT.md for
+/// the bounds. Never allocates, never throws; linear in the bytes.
 Result<DatagramView, WireError> parse_datagram(std::span<const std::uint8_t> bytes);
 
-/// Bytes of the hint (with its approximate flag) in canonical form, as the object id and the receiver's
-/// grouping hash them.
+/// Bytes of the hint (with its approximate flag) in canonical form, as the object id and the
+/// receiver's grouping hash them.
 inline constexpr std::size_t kCanonicalHintBytes = 44;
 std::array<std::uint8_t, kCanonicalHintBytes> canonical_bytes(const Hint& hint);
 
+/// True when parse_datagram would not refuse the hint as bad_hint.
+bool acceptable(const Hint& hint);
+
 /// True when the record alone would pass parse_datagram under this hint. The sender uses it to drop
-/// what no receiver would accept.
+/// what no receiver would accept. A record does not depend on the hint's counts beyond
+/// acceptable(hint).
 bool acceptable(const EllipsoidRecord& record, const Hint& hint);
 bool acceptable(const VertexRecord& record, const Hint& hint);
 
-/// Builds one datagram of at most `capacity` bytes.
+/// Builds one datagram of at most `capacity` bytes. It writes what it is told: hint, indices and
+/// records are the caller's to keep acceptable.
 class DatagramWriter {
   public:
     /// Requires kMinDatagramBytes <= capacity <= kMaxDatagramBytes (asserted).
@@ -170,20 +183,24 @@ class DatagramWriter {
     [[nodiscard]] std::size_t ellipsoids_that_fit() const;
     [[nodiscard]] std::size_t vertices_that_fit() const;
 
-    /// Adds a section of records with indices first, first + stride, ... Requires that they fit, that
-    /// there is at least one, and fewer than kMaxSections sections so far (asserted).
+    /// Adds a section of records with indices first, first + stride, ... Requires that they fit,
+    /// that there is at least one, and fewer than kMaxSections sections so far (asserted).
     void add_ellipsoids(std::uint32_t first, std::uint32_t stride,
                         std::span<const EllipsoidRecord> records);
     void add_vertices(std::uint32_t first, std::uint32_t stride,
                       std::span<const VertexRecord> records);
-    /// False, and nothing added, when it does not fit. Strings are cut to 255 bytes at a character's
-    /// border, control characters replaced by '_'.
+    /// False, and nothing added, when it does not fit. Strings are cut to 255 bytes at a
+    /// character's border, control characters and what is not UTF-8 replaced by '_'. Requires an
+    /// origin that is finite and within kMaxCoordinate (asserted).
     [[nodiscard]] bool add_description(const Description& description);
 
-    /// Appends the checksum and hands the bytes out; the writer is spent.
+    /// Appends the checksum and hands the bytes out; the writer is spent. Requires a section
+    /// (asserted), for no receiver takes a datagram without.
     [[nodiscard]] std::vector<std::uint8_t> finish();
 
   private:
+    [[nodiscard]] std::size_t free_bytes() const;
+
     std::vector<std::uint8_t> bytes_;
     std::size_t capacity_;
     std::size_t sections_ = 0;

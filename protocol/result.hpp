@@ -7,12 +7,15 @@
 
 namespace ellicast::protocol {
 
-/// Either a value or the reason why there is none; for peers' faults, which are normal and never thrown.
+/// Either a value or the reason why there is none; for peers' faults, which are normal and never
+/// thrown.
 template <class T, class E>
 class Result {
   public:
-    Result(T value) : content_(std::in_place_index<0>, std::move(value)) {}  // NOLINT(google-explicit-constructor)
-    Result(E error) : content_(std::in_place_index<1>, std::move(error)) {}  // NOLINT(google-explicit-constructor)
+    // Implicit, so that `return WireError::bad_hint;` reads as it should. NOLINTBEGIN(*-explicit-*)
+    Result(T value) : content_(std::in_place_index<0>, std::move(value)) {}
+    Result(E error) : content_(std::in_place_index<1>, std::move(error)) {}
+    // NOLINTEND(*-explicit-*)
 
     [[nodiscard]] bool has_value() const { return content_.index() == 0; }
     explicit operator bool() const { return has_value(); }

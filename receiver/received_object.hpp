@@ -9,8 +9,8 @@
 
 namespace ellicast::receiver {
 
-/// What arrived of one object: distinct records in index order. A value; the reconstruction is a function
-/// of it and of its options alone.
+/// What arrived of one object: distinct records in index order. A value; the reconstruction is a
+/// function of it and of its options alone.
 struct ReceivedObject {
     protocol::ObjectId id{};
     protocol::Hint hint;
@@ -20,5 +20,11 @@ struct ReceivedObject {
     std::vector<std::uint32_t> vertex_index;  // ascending
     std::vector<protocol::VertexRecord> vertices;
 };
+
+/// Every record that the hint announces is there.
+bool is_complete(const ReceivedObject& object);
+
+/// The object is complete and its records are those that its id was made of. Linear in the records.
+bool id_matches(const ReceivedObject& object);
 
 }  // namespace ellicast::receiver

@@ -26,7 +26,7 @@ struct ReconstructionOptions {
 struct Stages {
     common::TriangleMesh ellipsoids;      // a small mesh for each received ellipsoid
     common::TriangleMesh marching_cubes;  // after isolevel choice, before anything else
-    common::TriangleMesh halfway;         // the first chunk inserted, marching-cubes vertices still in
+    common::TriangleMesh halfway;  // the first chunk inserted, marching-cubes vertices still in
 };
 
 struct Reconstruction {
@@ -34,8 +34,9 @@ struct Reconstruction {
     std::vector<std::uint32_t> vertex_index;  // per position: record index, or kNotReceived
     std::vector<std::uint32_t> not_inserted;  // record indices that are no vertex of the mesh
     common::MeshTopology topology;
-    bool topology_as_promised = false;  // components, Euler characteristic in all and of the largest
-    bool judged = true;                 // false when the sender promised only approximately
+    bool topology_as_promised =
+        false;           // components, Euler characteristic in all and of the largest
+    bool judged = true;  // false when the sender promised only approximately
     float isolevel = 0;
     std::optional<Stages> stages;
 };
@@ -43,9 +44,9 @@ struct Reconstruction {
 inline constexpr std::uint32_t kNotReceived = 0xffffffffu;
 
 /// The receiver's half of [BK02]: distance grid, marching cubes, vertex insertion, removal of the
-/// marching-cubes vertices (sections 2 and 4.2). Empty when not a single ellipsoid arrived. The mesh is a
-/// closed, oriented 2-manifold whatever subset arrived. Same object, options: same bits, on any number of
-/// threads.
+/// marching-cubes vertices (sections 2 and 4.2). Empty when not a single ellipsoid arrived. The
+/// mesh is a closed, oriented 2-manifold whatever subset arrived. Same object, options: same bits,
+/// on any number of threads.
 std::optional<Reconstruction> reconstruct(const ReceivedObject& object,
                                           const ReconstructionOptions& options = {});
 

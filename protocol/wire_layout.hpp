@@ -1,0 +1,41 @@
+// protocol/wire_layout.hpp: where things stand in a datagram; WIRE_FORMAT.md sections 3 to 5.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "protocol/datagram.hpp"
+
+namespace ellicast::protocol {
+
+inline constexpr std::uint8_t kRtpVersion = 2;
+inline constexpr std::size_t kRtpBytes = 12;
+inline constexpr std::size_t kSequenceOffset = 2;
+inline constexpr std::size_t kTimestampOffset = 4;
+inline constexpr std::size_t kVersionOffset = 12;
+inline constexpr std::size_t kFlagsOffset = 13;
+inline constexpr std::size_t kHintOffset = 30;
+inline constexpr std::size_t kHintBytes = 43;
+inline constexpr std::size_t kRoundOffset = 73;
+
+inline constexpr std::uint8_t kFlagApproximate = 0x01;
+// 0x02 sealed and 0x04 signed are reserved; like all other bits they are refused.
+
+inline constexpr std::size_t kKindAndLengthBytes = 3;  // in front of every section's body
+inline constexpr std::size_t kIndexBytes = 10;         // count, first, stride in front of records
+inline constexpr std::size_t kMaxStringBytes = 255;
+
+static_assert(kHintOffset == kRtpBytes + 2 + sizeof(SessionId) + sizeof(ObjectId));
+static_assert(kRoundOffset == kHintOffset + kHintBytes);
+static_assert(kHeaderBytes == kRoundOffset + 16);
+static_assert(kSectionHeaderBytes == kKindAndLengthBytes + kIndexBytes);
+static_assert(kCanonicalHintBytes == kHintBytes + 1);
+
+/// Bytes of one record of a section of this kind; 0 for kinds that hold no records.
+constexpr std::size_t record_bytes(SectionKind kind) {
+    if (kind == SectionKind::ellipsoids) return kEllipsoidBytes;
+    if (kind == SectionKind::vertices) return kVertexBytes;
+    return 0;
+}
+
+}  // namespace ellicast::protocol
