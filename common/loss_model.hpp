@@ -105,25 +105,9 @@ struct ImpairmentCounts {
 
 /// A seeded, clockless network: datagrams go in, those that survive come out, perhaps later, twice
 /// or damaged. Same seed, same input: same output. Each kind of damage draws from its own seeded
-<<<<<<< HEAD
-<<<<<<< HEAD
-<<<<<<< HEAD
-/// stream, so that switching one on does not change what the others do.
-=======
 /// stream, and the same amount for every datagram offered, lost or not, so that switching one on
 /// does not change what the others do to a datagram. Damaged first, then doubled; both copies are
 /// held back together.
->>>>>>> wire
-=======
-/// stream, and the same amount for every datagram offered, lost or not, so that switching one on
-/// does not change what the others do to a datagram. Damaged first, then doubled; both copies are
-/// held back together.
->>>>>>> send
-=======
-/// stream, and the same amount for every datagram offered, lost or not, so that switching one on
-/// does not change what the others do to a datagram. Damaged first, then doubled; both copies are
-/// held back together.
->>>>>>> recv
 class Impairment {
   public:
     explicit Impairment(const ImpairmentOptions& options);

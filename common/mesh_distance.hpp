@@ -23,26 +23,9 @@ struct MeshDistance {
     double mean_to_reference = 0;
     double mean_from_reference = 0;
     double max = 0;  // over samples and vertices of both, both ways
-<<<<<<< HEAD
-<<<<<<< HEAD
-<<<<<<< HEAD
-    double normal_deg =
-        0;  // mean angle, area-weighted, between a sample's and its closest triangle's normal
-=======
     // Mean angle between a sample's and its closest triangle's normal; samples are even in area.
     // The larger of the two directions. Zero-area triangles have no normal and are left out.
     double normal_deg = 0;
->>>>>>> measure
-=======
-    // Mean angle between a sample's and its closest triangle's normal; samples are even in area.
-    // The larger of the two directions. Zero-area triangles have no normal and are left out.
-    double normal_deg = 0;
->>>>>>> send
-=======
-    // Mean angle between a sample's and its closest triangle's normal; samples are even in area.
-    // The larger of the two directions. Zero-area triangles have no normal and are left out.
-    double normal_deg = 0;
->>>>>>> recv
 
     [[nodiscard]] double rms() const {
         return rms_to_reference > rms_from_reference ? rms_to_reference : rms_from_reference;

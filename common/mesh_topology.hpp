@@ -38,25 +38,10 @@ MeshTopology analyse_topology(const TriangleMesh& mesh);
 /// Component of every triangle (edge-connected), numbered from 0 in order of first triangle.
 std::vector<std::uint32_t> triangle_components(const TriangleMesh& mesh);
 
-<<<<<<< HEAD
-<<<<<<< HEAD
-<<<<<<< HEAD
-=======
-=======
->>>>>>> send
-=======
->>>>>>> recv
 /// Smallest box that holds all triangles, whatever unreferenced vertices there are; Eigen's empty
 /// box when there is no triangle.
 Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh);
 
-<<<<<<< HEAD
-<<<<<<< HEAD
->>>>>>> measure
-=======
->>>>>>> send
-=======
->>>>>>> recv
 /// Signed volume by the divergence theorem; positive for outward orientation. Meaningful when
 /// closed.
 double signed_volume(const TriangleMesh& mesh);

@@ -18,21 +18,6 @@ class ModelError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-<<<<<<< HEAD
-<<<<<<< HEAD
-<<<<<<< HEAD
-/// Reads a model file: PLY (ascii, both binary orders), OBJ, OFF, STL, by extension (any case),
-/// through OpenMesh with an importer of our own that keeps polygons as they are, non-manifold ones
-/// too. Polygons are triangulated (fans from the corner that gives the best shapes; degenerate ones
-/// are dropped); STL's repeated corners are welded by equal bits. Positions as in the file. Throws
-/// ModelError: missing, empty, truncated (counts in the header are checked against the bytes before
-/// anything is allocated) or non-mesh file, no faces, a coordinate that is not finite, a face index
-/// out of range. Cost: linear; memory a small multiple of the mesh.
-=======
-=======
->>>>>>> send
-=======
->>>>>>> recv
 /// Reads a model file: PLY (ascii, both binary orders), OBJ, OFF (text), STL (both), by extension
 /// (any case), through OpenMesh with an importer of our own that keeps polygons as they are,
 /// non-manifold ones too. Polygons are triangulated (fans from the corner that gives the best
@@ -43,13 +28,6 @@ class ModelError : public std::runtime_error {
 /// against the bytes before anything is allocated) or non-mesh file, no faces, a coordinate that is
 /// not finite (or beyond float32), a face index out of range, a face of more than 2048 corners.
 /// Cost: linear; memory a small multiple of the file.
-<<<<<<< HEAD
-<<<<<<< HEAD
->>>>>>> measure
-=======
->>>>>>> send
-=======
->>>>>>> recv
 TriangleMesh read_model(const std::filesystem::path& path);
 
 /// The same for the bytes of a file, `extension` as in ".ply". ModelError gives only the reason.
@@ -68,25 +46,9 @@ struct PlyOptions {
 };
 
 /// Writes a binary little-endian PLY through a temporary beside it and a rename, so that a reader
-<<<<<<< HEAD
-<<<<<<< HEAD
-<<<<<<< HEAD
-/// never sees half a file. Same input, same bytes. Throws ModelError (path and reason).
-=======
 /// never sees half a file. Same input, same bytes. Throws ModelError (path and reason); a position
 /// that is not finite in the written type is a reason. Requires one value per vertex in each
 /// property (asserted).
->>>>>>> measure
-=======
-/// never sees half a file. Same input, same bytes. Throws ModelError (path and reason); a position
-/// that is not finite in the written type is a reason. Requires one value per vertex in each
-/// property (asserted).
->>>>>>> send
-=======
-/// never sees half a file. Same input, same bytes. Throws ModelError (path and reason); a position
-/// that is not finite in the written type is a reason. Requires one value per vertex in each
-/// property (asserted).
->>>>>>> recv
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
                const PlyOptions& options = {});
 

@@ -35,20 +35,6 @@ struct GridFrame {
 };
 
 /// A grid whose longest axis has `cells` cells across the box, with `margin` further cells on every
-<<<<<<< HEAD
-/// side. Requires a non-empty, finite box of positive diagonal, cells >= 1, margin >= 0 (asserted).
-GridFrame make_grid_frame(const Eigen::AlignedBox3d& box, int cells, int margin);
-
-/// 1 where the node lies inside the solid (non-zero winding number of a closed mesh), else 0; one
-/// byte a node. Exact parity of crossings along x rows with a consistent rule for rows that meet
-/// edges and vertices, so that shared edges count once. Cost: triangles x rows they cover. Threads
-/// do not change the result. Triangles of an open mesh give streaks: close it first.
-std::vector<std::uint8_t> voxelise_solid(const TriangleMesh& mesh, const GridFrame& frame,
-                                         unsigned threads = 0);
-
-/// |A and B| / |A or B| of the two solids on a common grid with `cells` cells along the longest
-/// axis of the joint box. 1 when both are empty.
-=======
 /// side. Node (margin, margin, margin) is the low corner of the box; shorter axes get as many cells
 /// as cover the box, at least one. Requires a non-empty, finite box of positive diagonal, cells >=
 /// 1, margin >= 0 (asserted).
@@ -66,7 +52,6 @@ std::vector<std::uint8_t> voxelise_solid(const TriangleMesh& mesh, const GridFra
 /// |A and B| / |A or B| of the two solids, counted at the centres of a common grid of cells with
 /// `cells` cells along the longest axis of the joint box. 1 when both are empty. Threads do not
 /// change the result.
->>>>>>> measure
 double volume_overlap(const TriangleMesh& a, const TriangleMesh& b, int cells = 256,
                       unsigned threads = 0);
 

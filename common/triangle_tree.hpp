@@ -40,25 +40,10 @@ class TriangleTree {
     [[nodiscard]] Hit closest(
         const Eigen::Vector3d& x,
         double max_squared_distance = std::numeric_limits<double>::infinity()) const;
-<<<<<<< HEAD
-<<<<<<< HEAD
-<<<<<<< HEAD
-=======
-=======
->>>>>>> send
-=======
->>>>>>> recv
 
     /// All triangles whose bounding boxes meet or touch `box`, ascending, into `triangles` (what
     /// was in there goes; the caller keeps the vector from query to query to save allocations).
     void find_meeting(const Eigen::AlignedBox3d& box, std::vector<std::uint32_t>& triangles) const;
-<<<<<<< HEAD
-<<<<<<< HEAD
->>>>>>> measure
-=======
->>>>>>> send
-=======
->>>>>>> recv
 
     [[nodiscard]] bool empty() const { return corners_.empty(); }
 
