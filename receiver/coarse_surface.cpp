@@ -9,6 +9,7 @@
 
 #include "common/marching_cubes.hpp"
 #include "common/mesh_topology.hpp"
+#include "common/parallel.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -21,12 +22,12 @@ constexpr int kMarginCells = 4;
 // section 4).
 constexpr std::array<double, 5> kIsolevels = {0.5, 0.25, 0.75, 1.0, 1.5};
 
+// With points, on top of the local isolevel.
+constexpr std::array<double, 5> kOffsets = {0.0, 0.25, -0.25, 0.5, 1.0};
+
 // A surplus component below this share of the whole volume is debris: a bubble between ellipsoids,
 // or one ellipsoid cut off by the loss of its neighbours.
 constexpr double kDebrisShare = 0.01;
-
-// Enough points for a mean that two isolevels 0.25 cells apart cannot tie on.
-constexpr std::size_t kMaxFieldSamples = 20'000;
 
 // Keeps the triangles whose component has keep[c], and renumbers.
 common::TriangleMesh keep_components(const common::TriangleMesh& mesh,
@@ -91,26 +92,117 @@ Miss miss(const common::MeshTopology& topology, const PromisedTopology& promise)
             std::abs(topology.euler_largest - promise.euler_largest)};
 }
 
-// Isolevels in the order in which they are to be tried.
-std::array<double, 5> preferred_isolevels(const common::DistanceGrid& grid,
-                                          std::span<const Eigen::Vector3d> points) {
-    std::array<double, 5> levels = kIsolevels;
-    for (double& level : levels) level *= grid.frame.spacing;
-    if (points.empty()) return levels;
-    const std::size_t stride = std::max<std::size_t>(1, points.size() / kMaxFieldSamples);
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < points.size(); i += stride) {
-        const double v = common::sample(grid, points[i]);
-        if (v >= grid.outside) continue;  // far from every ellipsoid that arrived: says nothing
-        sum += v;
-        ++count;
+// The field's value at the received points, as a smooth function of space: sums on a coarse lattice, one node in
+// kBlockCells cells of the grid.
+class LocalIsolevel {
+  public:
+    LocalIsolevel(const common::DistanceGrid& grid, std::span<const Eigen::Vector3d> points)
+        : h_(grid.frame.spacing) {
+        frame_.origin = grid.frame.origin;
+        frame_.spacing = kBlockCells * h_;
+        for (std::size_t a = 0; a < 3; ++a) {
+            frame_.dims[a] = (grid.frame.dims[a] - 1) / kBlockCells + 2;
+        }
+        sum_.assign(frame_.size(), 0.0);
+        weight_.assign(frame_.size(), 0.0);
+        for (const Eigen::Vector3d& x : points) {
+            const double v = std::clamp(common::sample(grid, x), kLowest * h_, kHighest * h_);
+            add(x, v);
+        }
+        const double total = std::accumulate(weight_.begin(), weight_.end(), 0.0);
+        mean_ = total > 0.0 ? std::accumulate(sum_.begin(), sum_.end(), 0.0) / total : 0.5 * h_;
+        for (int axis = 0; axis < 3; ++axis) {
+            blur(axis, sum_);
+            blur(axis, weight_);
+        }
     }
-    if (count == 0) return levels;
-    const double mean = sum / static_cast<double>(count);
-    std::stable_sort(levels.begin(), levels.end(),
-                     [&](double a, double b) { return std::abs(a - mean) < std::abs(b - mean); });
-    return levels;
+
+    [[nodiscard]] double operator()(const Eigen::Vector3d& x) const {
+        double sum = kPrior * mean_;
+        double weight = kPrior;
+        for_each_node(x, [&](std::size_t node, double w) {
+            sum += w * sum_[node];
+            weight += w * weight_[node];
+        });
+        return sum / weight;
+    }
+
+  private:
+    static constexpr int kBlockCells = 4;
+    static constexpr double kLowest = -0.5;  // in cells
+    static constexpr double kHighest = 2.0;
+    static constexpr double kPrior = 0.05;  // weight of the mean, in points
+
+    template <class Visit>
+    void for_each_node(const Eigen::Vector3d& x, const Visit& visit) const {
+        const Eigen::Vector3d g = (x - frame_.origin) / frame_.spacing;
+        std::array<int, 3> c{};
+        Eigen::Vector3d f;
+        for (int axis = 0; axis < 3; ++axis) {
+            const int last = frame_.dims[static_cast<std::size_t>(axis)] - 2;
+            const double at = std::clamp(g[axis], 0.0, static_cast<double>(last) + 1.0);
+            c[static_cast<std::size_t>(axis)] = std::min(static_cast<int>(at), last);
+            f[axis] = at - c[static_cast<std::size_t>(axis)];
+        }
+        for (int corner = 0; corner < 8; ++corner) {
+            const int dx = corner & 1;
+            const int dy = (corner >> 1) & 1;
+            const int dz = corner >> 2;
+            visit(frame_.index(c[0] + dx, c[1] + dy, c[2] + dz),
+                  (dx ? f[0] : 1 - f[0]) * (dy ? f[1] : 1 - f[1]) * (dz ? f[2] : 1 - f[2]));
+        }
+    }
+
+    void add(const Eigen::Vector3d& x, double v) {
+        for_each_node(x, [&](std::size_t node, double w) {
+            sum_[node] += w * v;
+            weight_[node] += w;
+        });
+    }
+
+    // Binomial (1 2 1) / 4 along an axis, zero beyond the ends.
+    void blur(int axis, std::vector<double>& field) const {
+        const std::vector<double> old = field;
+        const auto a = static_cast<std::size_t>(axis);
+        std::array<int, 3> n{};
+        for (n[2] = 0; n[2] < frame_.dims[2]; ++n[2]) {
+            for (n[1] = 0; n[1] < frame_.dims[1]; ++n[1]) {
+                for (n[0] = 0; n[0] < frame_.dims[0]; ++n[0]) {
+                    const std::size_t here = frame_.index(n[0], n[1], n[2]);
+                    std::array<int, 3> m = n;
+                    double value = 0.5 * old[here];
+                    if (--m[a] >= 0) value += 0.25 * old[frame_.index(m[0], m[1], m[2])];
+                    m[a] += 2;
+                    if (m[a] < frame_.dims[a]) value += 0.25 * old[frame_.index(m[0], m[1], m[2])];
+                    field[here] = value;
+                }
+            }
+        }
+    }
+
+    double h_;
+    common::GridFrame frame_;
+    std::vector<double> sum_;
+    std::vector<double> weight_;
+    double mean_ = 0.0;
+};
+
+void subtract_local_isolevel(std::span<const Eigen::Vector3d> points, unsigned threads,
+                             common::DistanceGrid& grid) {
+    const LocalIsolevel level(grid, points);
+    const common::GridFrame& frame = grid.frame;
+    common::parallel_for(static_cast<std::size_t>(frame.dims[2]), threads,
+                         [&](std::size_t begin, std::size_t end) {
+        for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
+            for (int j = 0; j < frame.dims[1]; ++j) {
+                for (int i = 0; i < frame.dims[0]; ++i) {
+                    float& v = grid.values[frame.index(i, j, k)];
+                    if (std::abs(v) > 4.0 * frame.spacing) continue;
+                    v -= static_cast<float>(level(frame.position(i, j, k)));
+                }
+            }
+        }
+    });
 }
 
 }  // namespace
@@ -121,10 +213,13 @@ std::optional<CoarseSurface> make_coarse_surface(std::span<const common::Ellipso
                                                  const PromisedTopology& promise, int cells,
                                                  unsigned threads) {
     const common::GridFrame frame = common::make_grid_frame(box, cells, kMarginCells);
-    const common::DistanceGrid grid = common::make_distance_grid(ellipsoids, frame, threads);
+    common::DistanceGrid grid = common::make_distance_grid(ellipsoids, frame, threads);
+    const bool local = !points.empty();
+    if (local) subtract_local_isolevel(points, threads, grid);
     std::optional<CoarseSurface> best;
     Miss best_miss{};
-    for (const double level : preferred_isolevels(grid, points)) {
+    for (const double offset : local ? kOffsets : kIsolevels) {
+        const double level = offset * frame.spacing;
         common::TriangleMesh mesh = without_debris(
             common::marching_cubes(frame, grid.values, static_cast<float>(level), threads),
             promise.components);

@@ -21,4 +21,10 @@ struct ReceivedObject {
     std::vector<protocol::VertexRecord> vertices;
 };
 
+/// Every record that the hint announces is there.
+bool is_complete(const ReceivedObject& object);
+
+/// The object is complete and its records are those that its id was made of. Linear in the records.
+bool id_matches(const ReceivedObject& object);
+
 }  // namespace ellicast::receiver
