@@ -56,6 +56,7 @@ class Session {
     /// True when every round was sent and nothing is held back.
     [[nodiscard]] bool done() const { return done_; }
 
+    [[nodiscard]] const std::vector<RoundPlan>& plans() const { return plans_; }
     [[nodiscard]] const SessionCounts& counts() const { return counts_; }
     /// Datagrams in all rounds; empty when they go on forever.
     [[nodiscard]] std::optional<std::uint64_t> datagrams_in_all() const;
