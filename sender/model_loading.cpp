@@ -48,8 +48,8 @@ std::optional<fs::path> usable(const std::optional<fs::path>& cache,
     std::error_code error;
     fs::create_directories(*cache, error);
     if (!error && fs::is_directory(*cache, error)) return cache;
-    warnings.push_back("cache " + cache->string() + " is not used: " +
-                       (error ? error.message() : "not a directory"));
+    warnings.push_back("cache " + cache->string() +
+                       " is not used: " + (error ? error.message() : "not a directory"));
     return std::nullopt;
 }
 

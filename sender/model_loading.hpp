@@ -25,15 +25,16 @@ struct LoadedModel {
     std::filesystem::path path;
     BroadcastObject object;  // empty when the model was only decomposed
     ShapePromise promise;
-    Decomposition decomposition;  // without the ellipsoids: those are in the object
-    bool cached = false;          // the decomposition was found, not computed
+    Decomposition decomposition;        // without the ellipsoids: those are in the object
+    bool cached = false;                // the decomposition was found, not computed
     std::vector<StageTime> stages;      // read, prepare, cache, decompose, promise, object
     std::vector<std::string> warnings;  // of preparation, cache and promise
 };
 
-/// Reads a model file, prepares and decomposes it, and makes its object, which is named after the file's
-/// stem and has the seed of the decomposition. The cache's directory is made when missing; when it cannot
-/// be used, that is a warning. Throws common::ModelError, one line that names the path and the reason.
+/// Reads a model file, prepares and decomposes it, and makes its object, which is named after the
+/// file's stem and has the seed of the decomposition. The cache's directory is made when missing;
+/// when it cannot be used, that is a warning. Throws common::ModelError, one line that names the
+/// path and the reason.
 LoadedModel load_model(const std::filesystem::path& path, const DecompositionOptions& options,
                        const std::optional<std::filesystem::path>& cache);
 

@@ -95,7 +95,8 @@ CLI::Validator accepted_by(Parse parse) {
     return {check, ""};
 }
 
-/// A whole number from low to high; unlike CLI's own conversion, refuses signs and what does not fit.
+/// A whole number from low to high; unlike CLI's own conversion, refuses signs and what does not
+/// fit.
 template <class T>
 CLI::Option* add_number(CLI::App& app, const std::string& name, T& value, T low, T high,
                         const std::string& help) {
@@ -124,9 +125,9 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
         ->type_name("RULE")
         ->transform(CLI::CheckedTransformer(kCriteria).description("{volume,robust}"))
         ->default_str("robust");
-    add_number<std::uint64_t>(app, "--seed", geometry.seed, 0,
-                              std::numeric_limits<std::uint64_t>::max(),
-                              "Of seeds and of the order of vertices; another seed, another object");
+    add_number<std::uint64_t>(
+        app, "--seed", geometry.seed, 0, std::numeric_limits<std::uint64_t>::max(),
+        "Of seeds and of the order of vertices; another seed, another object");
     add_number<unsigned>(app, "--threads", geometry.threads, 0, 1024,
                          "Threads for geometry; 0: one per core");
     app.add_option("--cache", texts.cache, "Keep decompositions here, and take them from here")
@@ -137,7 +138,8 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
 }
 
 void add_stream_options(CLI::App& app, Options& options, Texts& texts) {
-    app.add_option("--to", texts.to, "Where to send; IPv6 addresses in brackets, port 5004 by default")
+    app.add_option("--to", texts.to,
+                   "Where to send; IPv6 addresses in brackets, port 5004 by default")
         ->type_name("HOST[:PORT]")
         ->check(accepted_by(destination_of));
     app.add_option("--rate", texts.rate,
@@ -177,9 +179,9 @@ void add_identity_number(CLI::App& app, const std::string& name, std::optional<T
            [name, &value](const std::string& text) {
                value = common::number<T>(text);
                if (!value) {
-                   throw CLI::ValidationError(
-                       name, "'" + text + "' is not a whole number from 0 to " +
-                                 std::to_string(std::numeric_limits<T>::max()));
+                   throw CLI::ValidationError(name,
+                                              "'" + text + "' is not a whole number from 0 to " +
+                                                  std::to_string(std::numeric_limits<T>::max()));
                }
            },
            help)

@@ -42,8 +42,8 @@ struct Options {
     FixedIdentity identity;
 };
 
-/// Parses the command line. Gives the exit code instead when there is nothing left to do: 0 after --help
-/// and --version, 2 after a line on stderr that names what is wrong.
+/// Parses the command line. Gives the exit code instead when there is nothing left to do: 0 after
+/// --help and --version, 2 after a line on stderr that names what is wrong.
 std::variant<Options, int> parse_options(int argc, const char* const* argv);
 
 }  // namespace ellicast::sender

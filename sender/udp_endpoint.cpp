@@ -29,8 +29,8 @@ using boost::system::error_code;
 // Room for the burst of a fast stream; the system may grant less.
 constexpr int kSendBufferBytes = 4 << 20;
 
-// Shortest sleep. Finer than any pace that one sees, coarse enough that a gigabit stream leaves in batches
-// of twenty instead of one wake-up a datagram.
+// Shortest sleep. Finer than any pace that one sees, coarse enough that a gigabit stream leaves in
+// batches of twenty instead of one wake-up a datagram.
 constexpr Time kLeastSleep = std::chrono::microseconds(200);
 
 constexpr Time kTick = std::chrono::milliseconds(200);
@@ -88,7 +88,8 @@ struct UdpEndpoint::Impl {
 void UdpEndpoint::Impl::open(const std::string& host, std::uint16_t port) {
     udp::resolver resolver(context);
     error_code error;
-    const auto found = resolver.resolve(host, std::to_string(port), udp::resolver::numeric_service, error);
+    const auto found =
+        resolver.resolve(host, std::to_string(port), udp::resolver::numeric_service, error);
     if (error) throw SendError("cannot resolve host '" + host + "': " + error.message());
     for (const auto& entry : found) {
         peer = entry.endpoint();
@@ -120,13 +121,13 @@ void UdpEndpoint::Impl::check_size(std::size_t datagram_bytes) const {
     const std::size_t packet = datagram_bytes + ip_udp_bytes();
     if (!carried || packet <= *carried) return;
     throw SendError("datagrams of " + std::to_string(datagram_bytes) + " bytes are packets of " +
-                    std::to_string(packet) + " bytes, and the way to " + to_text(peer) + " carries " +
-                    std::to_string(*carried) + ": use --datagram " +
+                    std::to_string(packet) + " bytes, and the way to " + to_text(peer) +
+                    " carries " + std::to_string(*carried) + ": use --datagram " +
                     std::to_string(*carried - ip_udp_bytes()) + " or less");
 }
 
-/// Sends what is due and arranges for the next step: when the socket has room, the next datagram is due,
-/// or at once.
+/// Sends what is due and arranges for the next step: when the socket has room, the next datagram is
+/// due, or at once.
 void UdpEndpoint::Impl::step() {
     if (interrupted) return;
     if (batch_sent == batch.size()) {
@@ -194,7 +195,8 @@ bool UdpEndpoint::Impl::send_batch() {
 bool UdpEndpoint::Impl::go_on_after(int error) {
     if (error == EAGAIN || error == EWOULDBLOCK) return false;
     if (error == EINTR) return true;
-    // An ICMP answer to an earlier datagram, told in place of sending this one; telling it clears it.
+    // An ICMP answer to an earlier datagram, told in place of sending this one; telling it clears
+    // it.
     if (error == ECONNREFUSED && unreachable_in_a_row < 3) {
         ++unreachable_in_a_row;
         ++counts.unreachable;
@@ -237,10 +239,18 @@ bool UdpEndpoint::run(Session& session, const std::function<void()>& on_tick) {
     return !impl.interrupted;
 }
 
-std::string UdpEndpoint::peer() const { return to_text(impl_->peer); }
-std::size_t UdpEndpoint::ip_udp_bytes() const { return impl_->ip_udp_bytes(); }
-std::optional<std::size_t> UdpEndpoint::mtu() const { return impl_->mtu(); }
-const EndpointCounts& UdpEndpoint::counts() const { return impl_->counts; }
+std::string UdpEndpoint::peer() const {
+    return to_text(impl_->peer);
+}
+std::size_t UdpEndpoint::ip_udp_bytes() const {
+    return impl_->ip_udp_bytes();
+}
+std::optional<std::size_t> UdpEndpoint::mtu() const {
+    return impl_->mtu();
+}
+const EndpointCounts& UdpEndpoint::counts() const {
+    return impl_->counts;
+}
 
 Time UdpEndpoint::now() {
     return std::chrono::steady_clock::now().time_since_epoch();

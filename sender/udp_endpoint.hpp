@@ -13,37 +13,39 @@
 
 namespace ellicast::sender {
 
-/// The address cannot be sent to, or not in datagrams of this size; one line that names it and the reason.
+/// The address cannot be sent to, or not in datagrams of this size; one line that names it and the
+/// reason.
 class SendError : public std::runtime_error {
   public:
     using std::runtime_error::runtime_error;
 };
 
-/// What became of the datagrams that a session handed out. All of it is normal: nobody answers, and nobody
-/// needs to listen.
+/// What became of the datagrams that a session handed out. All of it is normal: nobody answers, and
+/// nobody needs to listen.
 struct EndpointCounts {
-    std::uint64_t sent = 0;         // taken by the operating system
-    std::uint64_t bytes = 0;        // of those, UDP payload
-    std::uint64_t refused = 0;      // not taken: no route, no buffers, filtered, too long; lost
-    std::uint64_t unreachable = 0;  // ICMP answers that nobody listens there; the datagram went out all the same
+    std::uint64_t sent = 0;     // taken by the operating system
+    std::uint64_t bytes = 0;    // of those, UDP payload
+    std::uint64_t refused = 0;  // not taken: no route, no buffers, filtered, too long; lost
+    std::uint64_t unreachable =
+        0;  // ICMP answers that nobody listens there; the datagram went out all the same
     std::uint64_t socket_full = 0;  // waits for room in the socket's buffer; nothing is lost
     std::string last_refusal;       // the operating system's word for the last one refused
 };
 
-/// A connected UDP socket, and the loop that empties a session into it. The sender's only contact with
-/// the network and its clock. Datagrams are never fragmented (DF).
+/// A connected UDP socket, and the loop that empties a session into it. The sender's only contact
+/// with the network and its clock. Datagrams are never fragmented (DF).
 class UdpEndpoint {
   public:
-    /// Resolves the host (name, IPv4 or IPv6 address without brackets) and opens a socket to the first of
-    /// its addresses that can be had. Throws SendError, also when the interface is known not to carry
-    /// datagrams of that size.
+    /// Resolves the host (name, IPv4 or IPv6 address without brackets) and opens a socket to the
+    /// first of its addresses that can be had. Throws SendError, also when the interface is known
+    /// not to carry datagrams of that size.
     UdpEndpoint(const std::string& host, std::uint16_t port, std::size_t datagram_bytes);
     ~UdpEndpoint();
     UdpEndpoint(const UdpEndpoint&) = delete;
     UdpEndpoint& operator=(const UdpEndpoint&) = delete;
 
-    /// Sends what the session hands out until it is done, or SIGINT or SIGTERM ends it: then false. While
-    /// it runs these signals do not end the program. Calls on_tick about five times a second.
+    /// Sends what the session hands out until it is done, or SIGINT or SIGTERM ends it: then false.
+    /// While it runs these signals do not end the program. Calls on_tick about five times a second.
     bool run(Session& session, const std::function<void()>& on_tick);
 
     /// As resolved: "127.0.0.1:5004", "[::1]:5004".

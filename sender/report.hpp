@@ -1,4 +1,4 @@
-// sender/send_report.hpp
+// sender/report.hpp
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,8 @@ struct SendOutcome {
     bool interrupted = false;  // by a signal, before the last round was over
 };
 
-/// Bits per second that left the sockets, headers below the payload included; 0 when nothing was sent.
+/// Bits per second that left the sockets, headers below the payload included; 0 when nothing was
+/// sent.
 double achieved_rate(const SendOutcome& outcome);
 
 /// The JSON of --report:
@@ -46,11 +47,12 @@ double achieved_rate(const SendOutcome& outcome);
 ///     rounds         whole ones sent
 ///     interrupted    true when a signal ended it
 ///     seconds        wall clock
-///     rate           {asked, achieved}: bits per second, IP and UDP headers included; asked 0: unpaced
-///     datagrams      {offered, sent, dropped_by_simulation, duplicated_by_simulation, refused,
-///                     unreachable, socket_full, bytes}; see SessionCounts and EndpointCounts. bytes are UDP
-///                     payload of those sent. offered + duplicated = sent + dropped + refused, unless
-///                     interrupted.
+///     rate           {asked, achieved}: bits per second, IP and UDP headers included; asked 0:
+///     unpaced datagrams      {offered, sent, dropped_by_simulation, duplicated_by_simulation,
+///     refused,
+///                     unreachable, socket_full, bytes}; see SessionCounts and EndpointCounts.
+///                     bytes are UDP payload of those sent. offered + duplicated = sent + dropped +
+///                     refused, unless interrupted.
 /// Plans are those of the models, in order, or none.
 std::string report_json(const Options& options, const std::vector<LoadedModel>& models,
                         const std::vector<RoundPlan>& plans,
@@ -59,8 +61,8 @@ std::string report_json(const Options& options, const std::vector<LoadedModel>& 
 /// Throws common::ModelError when it cannot be written.
 void write_report(const std::filesystem::path& path, const std::string& json);
 
-/// Throws common::ModelError when a file obviously cannot be made there (no such directory, a directory in
-/// its place), so that one learns it before the work and not after.
+/// Throws common::ModelError when a file obviously cannot be made there (no such directory, a
+/// directory in its place), so that one learns it before the work and not after.
 void check_writable(const std::filesystem::path& path);
 
 }  // namespace ellicast::sender

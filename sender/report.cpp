@@ -1,5 +1,5 @@
-// sender/send_report.cpp
-#include "sender/send_report.hpp"
+// sender/report.cpp
+#include "sender/report.hpp"
 
 #include <nlohmann/json.hpp>
 #include <system_error>
