@@ -55,8 +55,9 @@ bool radii_are_plausible(double l00, double l10, double l11, double l20, double 
     const double a20 = l10 * l21 - l11 * l20;
     const double norm_adj = a00 * a00 + a10 * a10 + a11 * a11 + a20 * a20 + a21 * a21 + a22 * a22;
     const double det = a22 * l22;
-    constexpr double kInverseLimit = 3.0 / (kMinRadius * kMinRadius);
-    return positive & (norm_L <= 3.0) & (norm_adj <= kInverseLimit * (det * det));
+    constexpr double kLimit = 3.0 * (1.0 + 1e-6) * (1.0 + 1e-6);
+    constexpr double kInverseLimit = kLimit / (kMinRadius * kMinRadius);
+    return positive & (norm_L <= kLimit) & (norm_adj <= kInverseLimit * (det * det));
 }
 
 }  // namespace

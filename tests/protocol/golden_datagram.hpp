@@ -1,0 +1,94 @@
+// tests/protocol/golden_datagram.hpp
+#pragma once
+
+#include "protocol/datagram.hpp"
+
+namespace ellicast::tests {
+
+/// One datagram of version 1 with a section of every kind, field by field in the order of
+/// WIRE_FORMAT.md. Worked out apart from the codec. It changes only together with the version.
+inline constexpr const char* kGoldenHex =
+    // clang-format off
+    "80 "  // RTP version 2, no padding, extension or sources
+    "e0 "  // marker, payload type 96
+    "ff fe "  // sequence
+    "01 02 03 04 "  // timestamp
+    "de ad be ef "  // SSRC
+    "01 "  // version
+    "01 "  // flags: approximate
+    "10 11 12 13 14 15 16 17 "  // session
+    "a0 a1 a2 a3 a4 a5 a6 a7 "  // object
+    "bf 80 00 00 c0 00 00 00 bf 00 00 00 "  // box, least corner: -1 -2 -0.5
+    "3f 80 00 00 40 00 00 00 40 80 00 00 "  // box, greatest corner: 1 2 4
+    "00 00 00 02 "  // components
+    "ff ff ff fc "  // Euler characteristic, all
+    "ff ff ff fa "  // of the largest component
+    "01 90 "  // ellipsoids
+    "00 00 bd 65 "  // vertices
+    "00 "  // record format
+    "00 00 00 03 "  // round
+    "00 00 00 05 "  // rounds
+    "00 00 02 7f "  // ordinal
+    "00 00 02 80 "  // datagrams
+    "03 "  // description
+    "00 28 "  // length
+    "3f e0 00 00 00 00 00 00 c0 90 00 00 "  // origin: 0.5 -1024 3
+    "00 00 00 00 40 08 00 00 00 00 00 00 "
+    "05 68 6f 72 73 65 "  // name
+    "02 6d 6d "  // unit
+    "00 "  // certificate
+    "05 30 2e 31 2e 30 "  // sender version
+    "01 "  // ellipsoids
+    "00 2e "  // length
+    "00 01 "  // count
+    "00 00 01 8f "  // first
+    "00 00 00 01 "  // stride
+    "3e 80 00 00 bf c0 00 00 40 00 00 00 "  // centre: 0.25 -1.5 2
+    "3f 00 00 00 3e 00 00 00 3f 40 00 00 "  // L: 0.5 | 0.125 0.75 | -0.25 0 1
+    "be 80 00 00 00 00 00 00 3f 80 00 00 "
+    "02 "  // vertices
+    "00 22 "  // length
+    "00 02 "  // count
+    "00 00 00 07 "  // first
+    "00 00 03 fd "  // stride
+    "3f 80 00 00 c0 00 00 00 40 80 00 00 "  // vertex 7: 1 -2 4
+    "bf 80 00 00 3d cc cc cd 40 50 00 00 "  // vertex 1028: -1 0.1 3.25
+    "c7 5f 05 47";  // CRC-32C
+// clang-format on
+
+/// What those bytes say.
+inline protocol::DatagramHeader golden_header() {
+    protocol::DatagramHeader header;
+    header.rtp = {true, 96, 0xfffe, 0x01020304, 0xdeadbeef};
+    header.session = {0x10, 0x11, 0x12, 0x13, 0x14, 0x15, 0x16, 0x17};
+    header.object = {0xa0, 0xa1, 0xa2, 0xa3, 0xa4, 0xa5, 0xa6, 0xa7};
+    header.hint.box_min = {-1.0f, -2.0f, -0.5f};
+    header.hint.box_max = {1.0f, 2.0f, 4.0f};
+    header.hint.components = 2;
+    header.hint.euler_all = -4;
+    header.hint.euler_largest = -6;
+    header.hint.ellipsoids = 400;
+    header.hint.vertices = 48'485;
+    header.hint.approximate = true;
+    header.round = 3;
+    header.rounds = 5;
+    header.ordinal = 639;
+    header.datagrams = 640;
+    return header;
+}
+
+inline protocol::Description golden_description() {
+    return {"horse", {0.5, -1024.0, 3.0}, "mm", "", "0.1.0"};
+}
+
+/// Index 399.
+inline protocol::EllipsoidRecord golden_ellipsoid() {
+    return {{0.25f, -1.5f, 2.0f, 0.5f, 0.125f, 0.75f, -0.25f, 0.0f, 1.0f}};
+}
+
+/// Indices 7 and 7 + 1021.
+inline std::vector<protocol::VertexRecord> golden_vertices() {
+    return {{{1.0f, -2.0f, 4.0f}}, {{-1.0f, 0.1f, 3.25f}}};
+}
+
+}  // namespace ellicast::tests
