@@ -35,18 +35,23 @@ struct GridFrame {
 };
 
 /// A grid whose longest axis has `cells` cells across the box, with `margin` further cells on every
-/// side. Requires a non-empty, finite box of positive diagonal, cells >= 1, margin >= 0 (asserted).
+/// side. Node (margin, margin, margin) is the low corner of the box; shorter axes get as many cells
+/// as cover the box, at least one. Requires a non-empty, finite box of positive diagonal, cells >=
+/// 1, margin >= 0 (asserted).
 GridFrame make_grid_frame(const Eigen::AlignedBox3d& box, int cells, int margin);
 
 /// 1 where the node lies inside the solid (non-zero winding number of a closed mesh), else 0; one
-/// byte a node. Exact parity of crossings along x rows with a consistent rule for rows that meet
-/// edges and vertices, so that shared edges count once. Cost: triangles x rows they cover. Threads
-/// do not change the result. Triangles of an open mesh give streaks: close it first.
+/// byte a node. Crossings along x rows are counted with a consistent rule for rows that meet edges
+/// and vertices, so that shared edges count once; a solid holds the nodes on its lower faces and
+/// not those on its upper ones, so a cube of n cells on the grid's own lattice has n^3 nodes. Cost:
+/// triangles x rows they cover, plus the nodes. Threads do not change the result. Triangles of an
+/// open mesh, or of one that is not oriented alike, give streaks along x: mend it first.
 std::vector<std::uint8_t> voxelise_solid(const TriangleMesh& mesh, const GridFrame& frame,
                                          unsigned threads = 0);
 
-/// |A and B| / |A or B| of the two solids on a common grid with `cells` cells along the longest
-/// axis of the joint box. 1 when both are empty.
+/// |A and B| / |A or B| of the two solids, counted at the centres of a common grid of cells with
+/// `cells` cells along the longest axis of the joint box. 1 when both are empty. Threads do not
+/// change the result.
 double volume_overlap(const TriangleMesh& a, const TriangleMesh& b, int cells = 256,
                       unsigned threads = 0);
 
