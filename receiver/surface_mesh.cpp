@@ -155,8 +155,6 @@ bool SurfaceMesh::can_flip(HalfedgeId h) const {
 
 void SurfaceMesh::flip(HalfedgeId h) {
     const HalfedgeId t = twins_[h];
-    const FaceId f = face_of(h);
-    const FaceId g = face_of(t);
     const VertexId a = from_vertex(h);
     const VertexId b = to_vertex(h);
     const VertexId c = opposite(h);
@@ -175,7 +173,7 @@ void SurfaceMesh::flip(HalfedgeId h) {
         outgoing_[y] = next(base);
         outgoing_[z] = prev(base);
     };
-    assert(f != g);
+    assert(face_of(h) != face_of(t));
     place(h, c, d, b);
     place(t, d, c, a);
     link(next(h), twin_db);

@@ -1,0 +1,224 @@
+// sender/round_layout.cpp
+#include "sender/round_layout.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <numeric>
+
+#include "protocol/datagram.hpp"
+
+namespace ellicast::sender {
+namespace {
+
+using protocol::kEllipsoidBytes;
+using protocol::kSectionHeaderBytes;
+using protocol::kVertexBytes;
+
+// DESIGN section 5: whoever joins late has a shape at once.
+constexpr std::uint32_t kSectionEvery = 8;
+
+// On models so large that a section in every 8th datagram means more copies than asked for, a
+// section holds this many: a shape for the late at once, for 3 % of the bytes (301 in 8 datagrams
+// of 1200).
+constexpr std::uint32_t kRidingEllipsoids = 8;
+
+std::uint32_t ceil_div(std::uint64_t a, std::uint64_t b) {
+    return static_cast<std::uint32_t>((a + b - 1) / b);
+}
+
+std::uint32_t ellipsoids_that_fit(std::size_t bytes) {
+    return bytes < kSectionHeaderBytes
+               ? 0
+               : static_cast<std::uint32_t>((bytes - kSectionHeaderBytes) / kEllipsoidBytes);
+}
+
+/// Size of residue class j of 0 .. count-1.
+std::uint32_t class_size(std::uint32_t count, std::uint32_t classes, std::uint32_t j) {
+    return count / classes + (j < count % classes ? 1 : 0);
+}
+
+std::uint32_t head_length(const LayoutSizes& sizes) {
+    return ceil_div(sizes.ellipsoids, ellipsoids_that_fit(sizes.payload - sizes.description));
+}
+
+/// How many ellipsoids a riding section may hold. Half a datagram when there are enough vertices
+/// for the other half, else all that is left beside a description.
+struct SectionLimits {
+    std::uint32_t usual = 1;
+    std::uint32_t full = 1;
+    std::uint32_t least = 1;
+};
+SectionLimits section_limits(const LayoutSizes& sizes) {
+    SectionLimits limits;
+    limits.full = ellipsoids_that_fit(sizes.payload - sizes.description);
+    limits.usual = std::clamp(ellipsoids_that_fit(sizes.payload / 2), 1u, limits.full);
+    limits.least = std::min(kRidingEllipsoids, limits.usual);
+    return limits;
+}
+
+/// Numbers of classes for further copies: `copies` or more of them, the first at least n, each of
+/// the first few without a common divisor with those before it (then with the last three: with many
+/// copies that is what matters, and numbers stay near n), until the sum is at least `sections`.
+std::vector<std::uint32_t> choose_groups(std::uint32_t head, std::uint32_t n,
+                                         std::uint32_t ellipsoids, std::size_t copies,
+                                         std::uint32_t sections) {
+    // One class is the whole: what fits into one section stays together.
+    const std::uint32_t largest = n == 1 ? 1 : std::min(ellipsoids, n + n / 4 + 3);
+    std::vector<std::uint32_t> groups;
+    std::uint64_t sum = 0;
+    std::uint32_t candidate = n;
+    const auto coprime = [&](std::uint32_t value) {
+        if (std::gcd(value, head) != 1) return false;
+        const std::size_t from = groups.size() > 3 ? groups.size() - 3 : 0;
+        return std::all_of(groups.begin() + static_cast<std::ptrdiff_t>(from), groups.end(),
+                           [&](std::uint32_t other) { return std::gcd(value, other) == 1; });
+    };
+    while (groups.size() < copies || sum < sections) {
+        std::uint32_t chosen = candidate;
+        std::uint32_t tried = 0;
+        const std::uint32_t span = largest - n + 1;
+        while (!coprime(chosen) && tried++ < span) chosen = chosen < largest ? chosen + 1 : n;
+        groups.push_back(chosen);
+        sum += chosen;
+        candidate = chosen < largest ? chosen + 1 : n;
+    }
+    return groups;
+}
+
+/// Groups for a body of that many datagrams; empty when they have no place in it.
+std::optional<std::vector<std::uint32_t>> groups_for(const LayoutSizes& sizes, std::uint32_t head,
+                                                     std::uint32_t body) {
+    if (sizes.copies <= 1) return std::vector<std::uint32_t>{};
+    const SectionLimits limits = section_limits(sizes);
+    const std::size_t further = sizes.copies - 1;
+    const std::uint32_t sections = ceil_div(body, kSectionEvery);
+    const std::uint32_t fewest = ceil_div(sizes.ellipsoids, limits.full);
+    const std::uint32_t wanted =
+        std::clamp(ceil_div(sections, further), ceil_div(sizes.ellipsoids, limits.usual),
+                   ceil_div(sizes.ellipsoids, limits.least));
+    for (std::uint32_t n = wanted; n >= fewest; --n) {
+        std::vector<std::uint32_t> groups =
+            choose_groups(head, n, sizes.ellipsoids, further, sections);
+        if (std::accumulate(groups.begin(), groups.end(), std::uint64_t{0}) <= body) return groups;
+    }
+    return std::nullopt;
+}
+
+void set_groups(RoundLayout& layout, std::vector<std::uint32_t> groups) {
+    layout.first_group.assign(1, 0);
+    for (const std::uint32_t n : groups)
+        layout.first_group.push_back(layout.first_group.back() + n);
+    layout.groups = std::move(groups);
+}
+
+/// Vertices that fit into one datagram beside everything else in it.
+std::uint32_t vertex_room(const LayoutSizes& sizes, const RoundLayout& layout,
+                          std::uint32_t ordinal) {
+    std::size_t taken = sizes.vertex_sections * kSectionHeaderBytes;
+    if (ordinal % sizes.description_interval == 0) taken += sizes.description;
+    if (const auto run = layout.ellipsoids_at(ordinal, 0)) {
+        // Another rotation may put a class with one more record here.
+        const std::uint32_t most = ceil_div(layout.ellipsoids, run->stride);
+        taken += kSectionHeaderBytes + most * kEllipsoidBytes;
+    }
+    return taken >= sizes.payload
+               ? 0
+               : static_cast<std::uint32_t>((sizes.payload - taken) / kVertexBytes);
+}
+
+std::uint64_t room_in_all(const LayoutSizes& sizes, const RoundLayout& layout) {
+    std::uint64_t room = 0;
+    for (std::uint32_t k = 0; k < layout.datagrams(); ++k) room += vertex_room(sizes, layout, k);
+    return room;
+}
+
+/// Gives every datagram the share of the vertices that its room is of all room, so that the last
+/// one is as full as the others.
+void share_vertices(const LayoutSizes& sizes, RoundLayout& layout) {
+    const std::uint64_t all = room_in_all(sizes, layout);
+    assert(all >= sizes.vertices);
+    std::uint64_t room = 0;
+    layout.first_vertex.assign(1, 0);
+    layout.first_vertex.reserve(layout.datagrams() + std::size_t{1});
+    for (std::uint32_t k = 0; k < layout.datagrams(); ++k) {
+        room += vertex_room(sizes, layout, k);
+        // Room and vertices are below 2^29 each: the product fits.
+        layout.first_vertex.push_back(static_cast<std::uint32_t>(room * sizes.vertices / all));
+    }
+}
+
+/// The next body length to try when `room` is too little.
+std::uint32_t lengthen(const LayoutSizes& sizes, std::uint32_t body, std::uint64_t room) {
+    const std::uint64_t each = (sizes.payload - kSectionHeaderBytes) / kVertexBytes;
+    const std::uint64_t missing = sizes.vertices - room;
+    return body + static_cast<std::uint32_t>(std::max<std::uint64_t>(1, missing / each));
+}
+
+RoundLayout start(const LayoutSizes& sizes) {
+    assert(sizes.ellipsoids >= 1 && sizes.vertices >= 1 && sizes.copies >= 1);
+    assert(sizes.vertex_sections >= 1 && sizes.description_interval >= 1);
+    assert(sizes.payload >= sizes.description + 2 * kSectionHeaderBytes + kEllipsoidBytes);
+    RoundLayout layout;
+    layout.ellipsoids = sizes.ellipsoids;
+    layout.head = head_length(sizes);
+    set_groups(layout, {});
+    return layout;
+}
+
+}  // namespace
+
+std::optional<EllipsoidRun> RoundLayout::ellipsoids_at(std::uint32_t ordinal,
+                                                       std::uint32_t rotation) const {
+    if (ordinal < head) {
+        const std::uint32_t j = (ordinal + rotation % head) % head;
+        return EllipsoidRun{j, head, class_size(ellipsoids, head, j)};
+    }
+    // Sections stand at even distances: datagram d of the body has one where the running sum
+    // floor((d + 1) sections / body) steps up. Two neighbours are at most ceil(body / sections)
+    // apart.
+    const std::uint64_t d = ordinal - head;
+    const std::uint64_t before = d * sections() / body;
+    if (before == (d + 1) * sections() / body) return std::nullopt;
+    // The classes of a copy are rotated among its places, so that a place has at most one record
+    // more or less than in another round.
+    const auto copy = static_cast<std::size_t>(
+        std::upper_bound(first_group.begin(), first_group.end(), before) - first_group.begin() - 1);
+    const std::uint32_t n = groups[copy];
+    const auto j = static_cast<std::uint32_t>((before - first_group[copy] + rotation % n) % n);
+    return EllipsoidRun{j, n, class_size(ellipsoids, n, j)};
+}
+
+RoundLayout lay_out(const LayoutSizes& sizes) {
+    RoundLayout layout = start(sizes);
+    std::uint64_t fewest = ceil_div(sizes.ellipsoids, section_limits(sizes).full);
+    layout.body = static_cast<std::uint32_t>((sizes.copies - 1) * fewest);
+    for (;;) {
+        std::optional<std::vector<std::uint32_t>> groups =
+            groups_for(sizes, layout.head, layout.body);
+        if (!groups) {
+            ++layout.body;
+            continue;
+        }
+        set_groups(layout, std::move(*groups));
+        const std::uint64_t room = room_in_all(sizes, layout);
+        if (room >= sizes.vertices) break;
+        layout.body = lengthen(sizes, layout.body, room);
+    }
+    share_vertices(sizes, layout);
+    return layout;
+}
+
+RoundLayout lay_out_with_groups(const LayoutSizes& sizes, std::vector<std::uint32_t> groups) {
+    RoundLayout layout = start(sizes);
+    set_groups(layout, std::move(groups));
+    layout.body = layout.sections();
+    for (;;) {
+        const std::uint64_t room = room_in_all(sizes, layout);
+        if (room >= sizes.vertices) break;
+        layout.body = lengthen(sizes, layout.body, room);
+    }
+    share_vertices(sizes, layout);
+    return layout;
+}
+
+}  // namespace ellicast::sender

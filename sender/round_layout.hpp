@@ -1,0 +1,63 @@
+// sender/round_layout.hpp
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace ellicast::sender {
+
+/// What a layout depends on. Sizes in bytes.
+struct LayoutSizes {
+    std::size_t payload = 0;                 // of one datagram: what its sections may take
+    std::size_t description = 0;             // of the description's section
+    std::uint32_t description_interval = 1;  // datagrams from one description to the next
+    std::uint32_t ellipsoids = 0;
+    std::uint32_t vertices = 0;
+    std::size_t copies = 1;           // of every ellipsoid, at least; 1: exactly once
+    std::size_t vertex_sections = 1;  // of one datagram: headers to leave room for
+};
+
+/// A run of ellipsoid indices first, first + stride, ...
+struct EllipsoidRun {
+    std::uint32_t first = 0;
+    std::uint32_t stride = 1;
+    std::uint32_t count = 0;
+};
+
+/// Who carries which records: the part of a round that does not depend on its number. Datagrams
+/// 0 .. head-1 carry the first copy of all ellipsoids; in the `body` that follows, further copies
+/// ride along as sections at even distances. Vertices fill what room is left, by position in the
+/// round's order.
+struct RoundLayout {
+    std::uint32_t ellipsoids = 0;
+    std::uint32_t head = 0;
+    std::uint32_t body = 0;
+    std::vector<std::uint32_t>
+        groups;  // of each further copy: its section j is the class j mod groups
+    std::vector<std::uint32_t> first_group;   // running sums of groups; groups.size() + 1 values
+    std::vector<std::uint32_t> first_vertex;  // running sums of vertices; datagrams() + 1 values
+
+    [[nodiscard]] std::uint32_t datagrams() const { return head + body; }
+    [[nodiscard]] std::uint32_t sections() const { return first_group.back(); }
+
+    /// The ellipsoids in datagram `ordinal` of a round whose sections are rotated by `rotation`
+    /// places.
+    [[nodiscard]] std::optional<EllipsoidRun> ellipsoids_at(std::uint32_t ordinal,
+                                                            std::uint32_t rotation) const;
+};
+
+/// The shortest round that holds everything, up to a few datagrams, with a section of ellipsoids in
+/// at least every 8th datagram of the body and no datagram empty. Every copy divides the ellipsoids
+/// into another number of classes, without a common divisor as far as that goes, so that two
+/// ellipsoids that are lost together in one copy are not in the next. Requires ellipsoids,
+/// vertices, copies, vertex_sections and description_interval >= 1, and room for a description, an
+/// ellipsoid and a vertex with their section headers in the payload (asserted). Cost: about linear
+/// in the number of datagrams.
+RoundLayout lay_out(const LayoutSizes& sizes);
+
+/// The same with the copies of another layout of the same object.
+RoundLayout lay_out_with_groups(const LayoutSizes& sizes, std::vector<std::uint32_t> groups);
+
+}  // namespace ellicast::sender

@@ -1,0 +1,84 @@
+// sender/round_plan.hpp
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "protocol/datagram.hpp"
+#include "sender/broadcast_object.hpp"
+#include "sender/round_layout.hpp"
+
+namespace ellicast::sender {
+
+struct PlanOptions {
+    std::size_t datagram_bytes = protocol::kDefaultDatagramBytes;  // UDP payload, all included
+    /// Times that every ellipsoid is in a round, at least: on large models there are more, so that
+    /// no 8 datagrams in a row are without any. 1 means exactly once, at the start.
+    std::size_t copies = 3;
+    std::uint64_t bits_per_second = 20'000'000;  // spaces the descriptions; 0: unpaced
+    std::uint32_t rounds = 1;                    // said in every header; 0: forever
+    protocol::SessionId session{};
+};
+
+/// What only the moment of sending knows of a datagram.
+struct Stamp {
+    std::uint16_t sequence = 0;
+    std::uint32_t timestamp = 0;
+    std::uint32_t ssrc = 0;
+};
+
+/// Lays the rounds of one object out (DESIGN section 5) and makes any datagram of any round on
+/// demand. Every round holds each vertex exactly once and each ellipsoid exactly copies() times:
+/// - first the description and one copy of all ellipsoids, as residue classes of their ranks, so
+/// that every
+///   datagram is an even sample of the ranking; what room is left holds vertices;
+/// - then vertices, with a section of ellipsoids in at least every 8th datagram; every copy divides
+/// the
+///   ellipsoids into another number of classes, so that they are lost in other company;
+/// - the description again at least every 64 datagrams and, at the given rate, every 200 ms.
+/// Vertices go in index order in round 0; later rounds take another odd stride and start (see
+/// spread_order for why odd), and rotate the sections of ellipsoids.
+/// Memory: the object and 4 bytes a datagram.
+class RoundPlan {
+  public:
+    /// Requires an object as make_object gives it, a datagram size within the protocol's limits,
+    /// copies >= 1 (asserted). A description that would leave no room for a record loses its
+    /// certificate, unit and sender version, in this order. Linear in the number of datagrams.
+    RoundPlan(BroadcastObject object, const PlanOptions& options);
+
+    [[nodiscard]] const BroadcastObject& object() const { return object_; }
+    /// Of every ellipsoid in a round.
+    [[nodiscard]] std::size_t copies() const { return 1 + first_.groups.size(); }
+    /// Datagrams from one description to the next.
+    [[nodiscard]] std::uint32_t description_interval() const { return description_interval_; }
+
+    /// Datagrams in this round. All rounds but the first have the same number.
+    [[nodiscard]] std::uint32_t datagrams(std::uint32_t round) const {
+        return layout(round).datagrams();
+    }
+    /// Datagram `ordinal` of `round`, at most datagram_bytes, complete with checksum. A function of
+    /// the object, the options and the arguments alone. Requires ordinal < datagrams(round)
+    /// (asserted).
+    [[nodiscard]] std::vector<std::uint8_t> datagram(std::uint32_t round, std::uint32_t ordinal,
+                                                     const Stamp& stamp) const;
+
+  private:
+    [[nodiscard]] const RoundLayout& layout(std::uint32_t round) const {
+        return round > 0 && later_ ? *later_ : first_;
+    }
+    void add_ellipsoids(protocol::DatagramWriter& writer, std::uint32_t round,
+                        std::uint32_t ordinal) const;
+    void add_vertices(protocol::DatagramWriter& writer, std::uint32_t round,
+                      std::uint32_t ordinal) const;
+
+    BroadcastObject object_;
+    PlanOptions options_;
+    std::uint32_t description_interval_ = 1;
+    std::uint32_t largest_stride_ = 1;
+    RoundLayout first_;
+    std::optional<RoundLayout> later_;  // absent when there is one round only
+};
+
+}  // namespace ellicast::sender

@@ -1,0 +1,300 @@
+// tests/sender/round_plan_test.cpp
+#include "sender/round_plan.hpp"
+
+#include <algorithm>
+#include <bitset>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "tests/sender/made_objects.hpp"
+
+namespace ellicast::sender {
+namespace {
+
+using tests::made_object;
+
+/// Everything that a round says, datagram by datagram, after the protocol's own checks.
+struct ReadDatagram {
+    std::size_t bytes = 0;
+    protocol::DatagramHeader header;
+    std::vector<std::uint32_t> ellipsoids;
+    std::vector<std::uint32_t> vertices;
+    std::vector<std::uint32_t> strides;  // of the sections of vertices
+    std::optional<protocol::Description> description;
+};
+
+ReadDatagram read(const RoundPlan& plan, std::uint32_t round, std::uint32_t ordinal) {
+    const std::vector<std::uint8_t> bytes = plan.datagram(round, ordinal, {});
+    const auto view = protocol::parse_datagram(bytes);
+    REQUIRE(view.has_value());
+    ReadDatagram datagram;
+    datagram.bytes = bytes.size();
+    datagram.header = view->header;
+    bool records_match = true;
+    for (const protocol::SectionView& section : view->sections()) {
+        if (section.kind == protocol::SectionKind::description) {
+            datagram.description = section.description();
+            continue;
+        }
+        const bool ellipsoids = section.kind == protocol::SectionKind::ellipsoids;
+        if (!ellipsoids) datagram.strides.push_back(section.stride);
+        for (std::size_t k = 0; k < section.count; ++k) {
+            const std::uint32_t index = section.index(k);
+            (ellipsoids ? datagram.ellipsoids : datagram.vertices).push_back(index);
+            records_match &= ellipsoids ? section.ellipsoid(k) == plan.object().ellipsoids[index]
+                                        : section.vertex(k) == plan.object().vertices[index];
+        }
+    }
+    REQUIRE(records_match);
+    return datagram;
+}
+
+std::vector<ReadDatagram> read_round(const RoundPlan& plan, std::uint32_t round) {
+    std::vector<ReadDatagram> datagrams;
+    for (std::uint32_t k = 0; k < plan.datagrams(round); ++k) {
+        datagrams.push_back(read(plan, round, k));
+    }
+    return datagrams;
+}
+
+/// What must hold in any round of any plan.
+void check_round(const RoundPlan& plan, const PlanOptions& options, std::uint32_t round) {
+    const std::vector<ReadDatagram> datagrams = read_round(plan, round);
+    std::vector<std::size_t> ellipsoids(plan.object().ellipsoids.size(), 0);
+    std::vector<std::size_t> vertices(plan.object().vertices.size(), 0);
+    std::size_t without_description = 0;
+    std::size_t without_ellipsoids = 0;
+    for (std::uint32_t k = 0; k < datagrams.size(); ++k) {
+        const ReadDatagram& datagram = datagrams[k];
+        REQUIRE(datagram.bytes <= options.datagram_bytes);
+        REQUIRE(datagram.header.round == round);
+        REQUIRE(datagram.header.ordinal == k);
+        REQUIRE(datagram.header.datagrams == datagrams.size());
+        REQUIRE(datagram.header.rtp.marker == (k + 1 == datagrams.size()));
+        REQUIRE(datagram.header.object == plan.object().id);
+        REQUIRE(datagram.header.hint == plan.object().hint);
+        const bool has_records = !datagram.ellipsoids.empty() || !datagram.vertices.empty();
+        REQUIRE((has_records || datagram.description));
+        for (const std::uint32_t index : datagram.ellipsoids) ++ellipsoids[index];
+        for (const std::uint32_t index : datagram.vertices) ++vertices[index];
+
+        without_description = datagram.description ? 0 : without_description + 1;
+        REQUIRE(without_description < plan.description_interval());
+        without_ellipsoids = datagram.ellipsoids.empty() ? without_ellipsoids + 1 : 0;
+        if (options.copies > 1) REQUIRE(without_ellipsoids < 8);
+    }
+    REQUIRE(datagrams.front().description.has_value());
+    for (const std::size_t count : ellipsoids) REQUIRE(count == plan.copies());
+    for (const std::size_t count : vertices) REQUIRE(count == 1);
+    REQUIRE(plan.copies() >= options.copies);
+    if (options.copies == 1) REQUIRE(plan.copies() == 1);
+}
+
+}  // namespace
+
+TEST_CASE("every record is in a round exactly as often as promised, whatever the sizes") {
+    const std::uint64_t seed = GENERATE(range(1, 61));
+    common::Random random(seed);
+    const auto log_uniform = [&](double low, double high) {
+        return static_cast<std::size_t>(low * std::pow(high / low, random.uniform()));
+    };
+    PlanOptions options;
+    options.rounds = 3;
+    options.datagram_bytes = log_uniform(576.0, 9000.0);
+    options.copies = 1 + random.below(6);
+    options.bits_per_second = random.chance(0.2) ? 0 : log_uniform(1.0e4, 1.0e9);
+    const std::size_t ellipsoids = log_uniform(1.0, 3000.0);
+    const std::size_t vertices = log_uniform(2.0, 40'000.0);
+    CAPTURE(seed, options.datagram_bytes, options.copies, options.bits_per_second, ellipsoids,
+            vertices);
+    const RoundPlan plan(made_object(ellipsoids, vertices, seed), options);
+    for (std::uint32_t round = 0; round < 3; ++round) check_round(plan, options, round);
+}
+
+TEST_CASE("the smallest and the most lopsided objects make whole rounds") {
+    const auto [ellipsoids, vertices] = GENERATE(
+        std::pair<std::size_t, std::size_t>{1, 2}, std::pair<std::size_t, std::size_t>{1, 5000},
+        std::pair<std::size_t, std::size_t>{400, 2}, std::pair<std::size_t, std::size_t>{5000, 2},
+        std::pair<std::size_t, std::size_t>{5, 100'000});
+    PlanOptions options;
+    options.copies = GENERATE(1u, 2u, 3u, 9u);
+    options.rounds = 0;
+    options.datagram_bytes = GENERATE(576u, 1200u, 65507u);
+    CAPTURE(ellipsoids, vertices, options.copies, options.datagram_bytes);
+    const RoundPlan plan(made_object(ellipsoids, vertices), options);
+    for (const std::uint32_t round : {0u, 1u, 2u, 77u}) check_round(plan, options, round);
+}
+
+TEST_CASE("ellipsoids come first, then vertices in index order with stride one") {
+    const RoundPlan plan(made_object(400, 48'485), PlanOptions{});
+    const std::vector<ReadDatagram> datagrams = read_round(plan, 0);
+    std::set<std::uint32_t> seen;
+    std::size_t head = 0;
+    while (seen.size() < 400) {
+        REQUIRE_FALSE(datagrams[head].ellipsoids.empty());
+        seen.insert(datagrams[head].ellipsoids.begin(), datagrams[head].ellipsoids.end());
+        ++head;
+    }
+    CHECK(head <= 15);
+    std::uint32_t next = 0;
+    for (const ReadDatagram& datagram : datagrams) {
+        for (const std::uint32_t index : datagram.vertices) REQUIRE(index == next++);
+        for (const std::uint32_t stride : datagram.strides) REQUIRE(stride == 1);
+    }
+    // 91 vertices a datagram would be 533, the ellipsoids' own bytes 36 more.
+    CHECK(datagrams.size() <= 590);
+}
+
+TEST_CASE("later rounds change strides, starts and the places of ellipsoids, never an index") {
+    PlanOptions options;
+    options.rounds = 0;
+    const RoundPlan plan(made_object(100, 9000), options);
+    std::set<std::vector<std::uint32_t>> first_vertices;
+    std::set<std::vector<std::uint32_t>> first_ellipsoids;
+    for (std::uint32_t round = 0; round < 6; ++round) {
+        const ReadDatagram datagram = read(plan, round, 0);
+        first_ellipsoids.insert(datagram.ellipsoids);
+        first_vertices.insert(read(plan, round, plan.datagrams(round) - 3).vertices);
+        for (const std::uint32_t stride : datagram.strides) CHECK(stride % 2 == 1);
+    }
+    CHECK(first_vertices.size() == 6);
+    CHECK(first_ellipsoids.size() >= 3);
+}
+
+TEST_CASE("every datagram's vertices lie all over the model, in every round") {
+    const std::size_t count = GENERATE(2000u, 12'288u, 20'000u);
+    const std::vector<Eigen::Vector3d> points = tests::line_points(count);
+    PlanOptions options;
+    options.rounds = 0;
+    const RoundPlan plan(make_object(tests::model_of(points), ShapePromise{},
+                                     tests::balls_in(points, 60, 1), {"line", 1}),
+                         options);
+    for (std::uint32_t round = 0; round < 5; ++round) {
+        for (const ReadDatagram& datagram : read_round(plan, round)) {
+            // 62 vertices in at most two runs: one of them holds 31, so an aligned 16 of them.
+            if (datagram.vertices.size() < 62) continue;
+            std::bitset<16> sixteenths;
+            for (const std::uint32_t index : datagram.vertices) {
+                const double x = static_cast<double>(plan.object().vertices[index].position[0]);
+                sixteenths.set(static_cast<std::size_t>(16.0 * x / static_cast<double>(count)));
+            }
+            CAPTURE(count, round, datagram.header.ordinal, sixteenths);
+            REQUIRE(sixteenths.count() >= 15);
+        }
+    }
+}
+
+TEST_CASE("every section of ellipsoids is an even sample of the ranking") {
+    const RoundPlan plan(made_object(400, 20'000), PlanOptions{});
+    for (const ReadDatagram& datagram : read_round(plan, 0)) {
+        const auto& ranks = datagram.ellipsoids;
+        for (std::size_t k = 1; k < ranks.size(); ++k) {
+            REQUIRE(ranks[k] - ranks[k - 1] == ranks[1] - ranks[0]);
+        }
+        if (ranks.size() < 2) continue;
+        REQUIRE(ranks.front() < ranks[1] - ranks[0]);
+        REQUIRE(ranks.back() + (ranks[1] - ranks[0]) >= 400);
+    }
+}
+
+TEST_CASE("ellipsoids that are lost together in one copy are apart in the others") {
+    const RoundPlan plan(made_object(400, 48'485), PlanOptions{});
+    REQUIRE(plan.copies() == 3);
+    std::map<std::pair<std::uint32_t, std::uint32_t>, int> together;
+    for (const ReadDatagram& datagram : read_round(plan, 0)) {
+        for (const std::uint32_t a : datagram.ellipsoids) {
+            for (const std::uint32_t b : datagram.ellipsoids) {
+                if (a < b) ++together[{a, b}];
+            }
+        }
+    }
+    // In all three copies: only by all three numbers of classes dividing the distance of the ranks.
+    const auto worst = std::max_element(together.begin(), together.end(),
+                                        [](auto& a, auto& b) { return a.second < b.second; });
+    CHECK(worst->second <= 2);
+}
+
+TEST_CASE("a large model gets more copies, for a few percent of its bytes") {
+    const RoundPlan plan(made_object(100, 200'000), PlanOptions{});
+    CHECK(plan.copies() > 3);
+    std::size_t bytes = 0;
+    std::size_t for_ellipsoids = 0;
+    for (const ReadDatagram& datagram : read_round(plan, 0)) {
+        bytes += datagram.bytes;
+        for_ellipsoids += 36 * datagram.ellipsoids.size();
+    }
+    CHECK(static_cast<double>(for_ellipsoids) < 0.05 * static_cast<double>(bytes));
+}
+
+TEST_CASE("the description is repeated every 64 datagrams, and every 200 ms when that is sooner") {
+    PlanOptions options;
+    options.bits_per_second = 20'000'000;
+    CHECK(RoundPlan(made_object(10, 5000), options).description_interval() == 64);
+    options.bits_per_second = 0;
+    CHECK(RoundPlan(made_object(10, 5000), options).description_interval() == 64);
+    options.bits_per_second = 1'000'000;  // 100 datagrams of 1248 bytes a second
+    CHECK(RoundPlan(made_object(10, 5000), options).description_interval() == 20);
+    options.bits_per_second = 1000;
+    CHECK(RoundPlan(made_object(10, 5000), options).description_interval() == 1);
+}
+
+TEST_CASE("a description too long for the datagram keeps its name and origin") {
+    BroadcastObject object = made_object(10, 200);
+    object.description.name = std::string(255, 'n');
+    object.description.certificate = std::string(255, 'c');
+    object.description.unit = "mm";
+    object.description.sender_version = std::string(255, 'v');
+    object.description.origin = {1.0, 2.0, 3.0};
+    PlanOptions options;
+    options.datagram_bytes = protocol::kMinDatagramBytes;
+    const RoundPlan small(object, options);
+    check_round(small, options, 0);
+    const protocol::Description shown = *read(small, 0, 0).description;
+    CHECK(shown.name == object.description.name);
+    CHECK(shown.origin == object.description.origin);
+    CHECK(shown.certificate.empty());
+    const RoundPlan large(object, PlanOptions{});
+    CHECK(read(large, 0, 0).description == object.description);
+}
+
+TEST_CASE("a datagram is a function of object, options, round and ordinal, and carries its stamp") {
+    PlanOptions options;
+    options.rounds = 2;
+    options.session = {1, 2, 3, 4, 5, 6, 7, 8};
+    const RoundPlan one(made_object(50, 3000), options);
+    const RoundPlan two(made_object(50, 3000), options);
+    const Stamp stamp{65535, 0xfedcba98u, 0x12345678u};
+    for (std::uint32_t k = one.datagrams(1); k-- > 0;) {  // backwards, as order must not matter
+        REQUIRE(one.datagram(1, k, stamp) == two.datagram(1, k, stamp));
+    }
+    const std::vector<std::uint8_t> bytes = one.datagram(0, 3, stamp);
+    const auto view = protocol::parse_datagram(bytes);
+    REQUIRE(view.has_value());
+    CHECK(view->header.rtp.sequence == 65535);
+    CHECK(view->header.rtp.timestamp == 0xfedcba98u);
+    CHECK(view->header.rtp.ssrc == 0x12345678u);
+    CHECK(view->header.session == options.session);
+    CHECK(view->header.rounds == 2);
+    std::vector<std::uint8_t> stamped = one.datagram(0, 3, {0, 0, 0x12345678u});
+    protocol::stamp(stamped, 65535, 0xfedcba98u);
+    CHECK(stamped == bytes);
+}
+
+TEST_CASE("laying out 2^28 vertices takes memory for datagrams, not for vertices") {
+    LayoutSizes sizes;
+    sizes.payload = 1200 - 93;
+    sizes.description = 80;
+    sizes.description_interval = 64;
+    sizes.ellipsoids = 400;
+    sizes.vertices = 1u << 28;
+    sizes.copies = 3;
+    const RoundLayout layout = lay_out(sizes);
+    CHECK(layout.first_vertex.back() == sizes.vertices);
+    CHECK(layout.datagrams() < 1.06 * static_cast<double>(1u << 28) / 91.0);
+}
+
+}  // namespace ellicast::sender
