@@ -124,7 +124,7 @@ void StreamStatistics::update_jitter(Time now, std::uint32_t timestamp) {
 std::uint64_t StreamStatistics::lost_head() const {
     const std::uint64_t announced =
         std::uint64_t{oldest_.round} * oldest_.datagrams + oldest_.ordinal;
-    const double listened = to_seconds(first_seen_ - listening_since_);
+    const double listened = std::max(0.0, to_seconds(first_seen_ - listening_since_));
     const double lasted = to_seconds(newest_seen_ - first_seen_);
     if (!(lasted > 0.0)) return announced;  // no pace to go by
     // A quarter of a step of slack, so that a sender who starts with us is counted exactly.
