@@ -112,7 +112,8 @@ class Pipeline {
         stage("shift");
         shift_to_points(surface_, points_);
         stage("flip");
-        flip_to_smooth(surface_.mesh, {.min_gain = 0.3 * std::max(0.0, 1.0 - 2.0 * loss())});
+        flip_all_to_delaunay(surface_.mesh);
+        flip_to_smooth(surface_.mesh);
     }
 
     Reconstruction finish() {
