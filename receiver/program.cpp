@@ -184,7 +184,8 @@ ExitCode run(const Options& options) {
         clock.begin("write");
         const auto path = output_file(options.output, *reception.object);
         write_mesh(path, *reconstruction, *reception.object);
-        if (options.stages) write_stages(*options.stages, *reconstruction, *reception.object);
+        if (reconstruction->stages)
+            write_stages(*options.stages, *reconstruction, *reception.object);
         content.output = path.string();
     }
     if (reconstruction && reference) {
