@@ -1,0 +1,202 @@
+// receiver/report.cpp
+#include "receiver/report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "common/atomic_file.hpp"
+#include "common/model_io.hpp"
+#include "receiver/output_files.hpp"
+
+namespace ellicast::receiver {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json object_json(const ReportContent& content) {
+    if (!content.object) return nullptr;
+    const ReceivedObject& object = *content.object;
+    return {{"id", id_text(object.id)},
+            {"name", name_of(object)},
+            {"unit", object.description ? object.description->unit : ""},
+            {"complete", is_complete(object)},
+            {"id_verified", content.id_verified}};
+}
+
+Json hint_json(const ReportContent& content) {
+    if (!content.object) return nullptr;
+    const protocol::Hint& hint = content.object->hint;
+    return {{"box_min", hint.box_min},
+            {"box_max", hint.box_max},
+            {"components", hint.components},
+            {"euler_all", hint.euler_all},
+            {"euler_largest", hint.euler_largest},
+            {"approximate", hint.approximate}};
+}
+
+std::uint64_t lost_in_network(const ReportContent& content) {
+    const std::uint64_t lost = content.session.datagrams.lost;
+    return lost - std::min(lost, content.kernel_dropped);
+}
+
+Json datagrams_json(const ReportContent& content) {
+    const StreamCounts& counts = content.session.datagrams;
+    Json by_cause = Json::object();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(protocol::WireError::kCount); ++k) {
+        const auto cause = static_cast<protocol::WireError>(k);
+        by_cause[std::string(to_string(cause))] = content.session.malformed.of(cause);
+    }
+    return {{"received", counts.received},
+            {"lost", counts.lost},
+            {"duplicate", counts.duplicate},
+            {"reordered", counts.reordered},
+            {"malformed", content.session.malformed.total()},
+            {"kernel_dropped", content.kernel_dropped},
+            {"bytes", counts.bytes},
+            {"lost_in_network", lost_in_network(content)},
+            {"jitter_ms", counts.jitter_ms},
+            {"malformed_by", by_cause}};
+}
+
+std::size_t vertices_in_mesh(const ReportContent& content) {
+    if (!content.reconstruction) return 0;
+    const auto& index = content.reconstruction->vertex_index;
+    return index.size() -
+           static_cast<std::size_t>(std::count(index.begin(), index.end(), kNotReceived));
+}
+
+void add_records(const ReportContent& content, Json& report) {
+    const ReceivedObject* const object = content.object;
+    report["ellipsoids"] = {{"received", object ? object->ellipsoids.size() : 0},
+                            {"expected", object ? object->hint.ellipsoids : 0}};
+    report["vertices"] = {{"received", object ? object->vertices.size() : 0},
+                          {"expected", object ? object->hint.vertices : 0},
+                          {"in_mesh", vertices_in_mesh(content)}};
+    const SessionSummary& session = content.session;
+    report["records"] = {{"repeated", session.store.repeated},
+                         {"conflicting", session.conflicting},
+                         {"refused", session.store.refused}};
+    report["others"] = {{"groups", session.other_groups},
+                        {"datagrams", session.other_datagrams},
+                        {"contradictory_hints", session.contradictory_hints},
+                        {"evicted", session.store.evicted},
+                        {"over_limit", session.store.over_limit}};
+}
+
+void add_mesh(const ReportContent& content, Json& report) {
+    if (!content.reconstruction) {
+        report["mesh"] = nullptr;
+        report["not_inserted"] = Json::array();
+        return;
+    }
+    const Reconstruction& reconstruction = *content.reconstruction;
+    const common::MeshTopology& topology = reconstruction.topology;
+    report["mesh"] = {{"vertices", topology.vertices},
+                      {"faces", topology.faces},
+                      {"components", topology.components},
+                      {"genus", topology.genus()},
+                      {"closed", topology.closed},
+                      {"manifold", topology.manifold},
+                      {"topology_as_promised", reconstruction.topology_as_promised},
+                      {"judged", reconstruction.judged},
+                      {"isolevel", reconstruction.isolevel}};
+    report["not_inserted"] = reconstruction.not_inserted;
+}
+
+Json quality_json(const common::MeshDistance& quality) {
+    return {{"rms", quality.rms()},
+            {"mean", quality.mean()},
+            {"max", quality.max},
+            {"rms_to_reference", quality.rms_to_reference},
+            {"rms_from_reference", quality.rms_from_reference},
+            {"normal_deg", quality.normal_deg}};
+}
+
+std::string plural(std::size_t count, const char* one, const char* many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
+}
+
+std::string datagram_line(const ReportContent& content) {
+    const StreamCounts& counts = content.session.datagrams;
+    const std::uint64_t sent = counts.received - counts.duplicate + counts.lost;
+    const double share =
+        sent > 0 ? 100.0 * static_cast<double>(counts.lost) / static_cast<double>(sent) : 0.0;
+    std::string line =
+        fmt::format("{}, {} lost ({:.1f} %)", plural(counts.received, "datagram", "datagrams"),
+                    counts.lost, share);
+    const auto mention = [&](std::uint64_t count, const char* what) {
+        if (count > 0) line += fmt::format(", {} {}", count, what);
+    };
+    mention(content.kernel_dropped, "dropped by the kernel");
+    mention(counts.duplicate, "duplicate");
+    mention(counts.reordered, "reordered");
+    mention(content.session.malformed.total(), "malformed");
+    mention(content.session.other_datagrams, "of others");
+    return line + "\n";
+}
+
+std::string mesh_line(const ReportContent& content) {
+    const Reconstruction& reconstruction = *content.reconstruction;
+    const common::MeshTopology& topology = reconstruction.topology;
+    const char* const verdict = !reconstruction.judged                ? "topology not judged"
+                                : reconstruction.topology_as_promised ? "topology as promised"
+                                                                      : "topology NOT as promised";
+    return fmt::format(
+        "{}: {} vertices, {} faces, {}, genus {}, {}, {}\n", content.output, topology.vertices,
+        topology.faces, plural(topology.components, "component", "components"), topology.genus(),
+        topology.closed && topology.manifold ? "closed manifold" : "NOT a closed manifold",
+        verdict);
+}
+
+}  // namespace
+
+nlohmann::ordered_json make_report(const ReportContent& content) {
+    Json report;
+    report["ends_by"] = std::string(to_string(content.session.ends_by));
+    report["output"] = content.output.empty() ? Json(nullptr) : Json(content.output);
+    report["object"] = object_json(content);
+    report["hint"] = hint_json(content);
+    report["datagrams"] = datagrams_json(content);
+    add_records(content, report);
+    add_mesh(content, report);
+    if (content.quality) report["quality"] = quality_json(*content.quality);
+    report["seconds"] = Json::object();
+    for (const auto& [stage, seconds] : content.seconds) report["seconds"][stage] = seconds;
+    return report;
+}
+
+void write_report(const std::filesystem::path& path, const ReportContent& content) {
+    // A path need not be UTF-8, and no report is worth failing for that.
+    const std::string text =
+        make_report(content).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    try {
+        common::write_file_atomically(path, text);
+    } catch (const common::WriteFailure& failure) {
+        throw common::ModelError("cannot write '" + path.string() + "': " + failure.what());
+    }
+}
+
+std::string summary_text(const ReportContent& content) {
+    std::string text = datagram_line(content);
+    if (!content.object) return text;
+    const ReceivedObject& object = *content.object;
+    text = fmt::format("{}: {} of {} ellipsoids, {} of {} vertices\n", name_of(object),
+                       object.ellipsoids.size(), object.hint.ellipsoids, object.vertices.size(),
+                       object.hint.vertices) +
+           text;
+    if (content.reconstruction) text += mesh_line(content);
+    if (content.quality) {
+        const common::MeshDistance& q = *content.quality;
+        text += fmt::format(
+            "distance to the reference, shares of its diagonal: rms {:.2e}, mean {:.2e}, max "
+            "{:.2e}; "
+            "normals {:.1f} degrees\n",
+            q.rms(), q.mean(), q.max, q.normal_deg);
+    }
+    return text;
+}
+
+}  // namespace ellicast::receiver

@@ -1,0 +1,54 @@
+// receiver/udp_endpoint.hpp
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "common/text_values.hpp"
+#include "receiver/arrival.hpp"
+#include "receiver/session.hpp"
+
+namespace ellicast::receiver {
+
+/// The address cannot be listened on; one line that names it and the reason.
+class ListenError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// A bound UDP socket, and the loop that feeds a session from it. The receiver's only contact with
+/// the network and its clock. While it lives, SIGINT and SIGTERM end reception instead of the
+/// program.
+class UdpEndpoint {
+  public:
+    /// Binds; from then on nothing that arrives is missed. An empty host is any address, IPv4 and
+    /// IPv6 at once. Throws ListenError.
+    explicit UdpEndpoint(const common::Endpoint& listen);
+    ~UdpEndpoint();
+    UdpEndpoint(const UdpEndpoint&) = delete;
+    UdpEndpoint& operator=(const UdpEndpoint&) = delete;
+
+    /// Feeds the session until it is finished, by itself or by a signal. Calls on_tick(now) about
+    /// ten times a second. Datagrams bear the time at which the kernel took them.
+    void run(Session& session, const std::function<void(Time)>& on_tick);
+
+    /// As bound: "[::]:5004".
+    [[nodiscard]] std::string address() const;
+    /// What the kernel granted; bytes, its own overhead included.
+    [[nodiscard]] std::size_t receive_buffer() const;
+    /// Datagrams that found the socket's buffer full.
+    [[nodiscard]] std::uint64_t kernel_dropped() const;
+
+    /// The clock of all sessions fed here.
+    static Time now();
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ellicast::receiver
