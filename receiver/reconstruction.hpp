@@ -37,7 +37,7 @@ struct Reconstruction {
     bool topology_as_promised =
         false;           // components, Euler characteristic in all and of the largest
     bool judged = true;  // false when the sender promised only approximately
-    float isolevel = 0;
+    float isolevel = 0;  // model units; with vertices, what was added to the local one
     std::optional<Stages> stages;
 };
 
