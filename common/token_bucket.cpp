@@ -38,6 +38,7 @@ bool TokenBucket::take(Time now, std::size_t bytes) {
 }
 
 TokenBucket::Time TokenBucket::ready_at() const {
+    if (!started_) return Time::min();
     return Time(paid_ns_ + (paid_part_ > 0 ? 1 : 0));
 }
 

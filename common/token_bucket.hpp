@@ -26,7 +26,8 @@ class TokenBucket {
     /// (asserted).
     [[nodiscard]] bool take(Time now, std::size_t bytes);
 
-    /// The earliest time at which take() gives true, now or in the past when it would at once.
+    /// The earliest time at which take() gives true, in the past when it would at once; Time::min()
+    /// before the first.
     [[nodiscard]] Time ready_at() const;
 
   private:

@@ -1,6 +1,7 @@
 // protocol/acceptance.cpp
 #include "protocol/acceptance.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "protocol/byte_reader.hpp"
@@ -45,7 +46,7 @@ bool topology_is_possible(const Hint& hint) {
 /// So every allowed ellipsoid passes, and what passes has radii within [kMinRadius / sqrt 3, sqrt
 /// 3].
 bool radii_are_plausible(double l00, double l10, double l11, double l20, double l21, double l22) {
-    const bool positive = (l00 > 0.0) & (l11 > 0.0) & (l22 > 0.0);
+    const bool positive = l00 > 0.0 && l11 > 0.0 && l22 > 0.0;
     const double norm_L = l00 * l00 + l10 * l10 + l11 * l11 + l20 * l20 + l21 * l21 + l22 * l22;
     const double a00 = l11 * l22;
     const double a11 = l00 * l22;
@@ -57,7 +58,7 @@ bool radii_are_plausible(double l00, double l10, double l11, double l20, double 
     const double det = a22 * l22;
     constexpr double kLimit = 3.0 * (1.0 + 1e-6) * (1.0 + 1e-6);
     constexpr double kInverseLimit = kLimit / (kMinRadius * kMinRadius);
-    return positive & (norm_L <= kLimit) & (norm_adj <= kInverseLimit * (det * det));
+    return positive && norm_L <= kLimit && norm_adj <= kInverseLimit * (det * det);
 }
 
 }  // namespace
@@ -76,9 +77,9 @@ RecordBounds::RecordBounds(const Hint& hint) {
         center_min_[axis] = static_cast<double>(hint.box_min[axis]) - kCenterSlack * diagonal;
         center_max_[axis] = static_cast<double>(hint.box_max[axis]) + kCenterSlack * diagonal;
     }
-    for (std::size_t k = 0; k < 3 * kBlock; ++k) {
-        vertex_min_[k] = hint.box_min[k % 3];
-        vertex_max_[k] = hint.box_max[k % 3];
+    for (std::size_t k = 0; k < kBoxBlock; k += 3) {
+        std::copy(hint.box_min.begin(), hint.box_min.end(), vertex_min_.data() + k);
+        std::copy(hint.box_max.begin(), hint.box_max.end(), vertex_max_.data() + k);
     }
 }
 
@@ -87,18 +88,18 @@ bool RecordBounds::admits(const EllipsoidRecord& record) const {
     bool inside = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const double c = static_cast<double>(s[axis]);
-        inside &= (c >= center_min_[axis]) & (c <= center_max_[axis]);
+        inside &= c >= center_min_[axis] && c <= center_max_[axis];
     }
     std::array<double, 6> l{};
     for (std::size_t k = 0; k < 6; ++k) l[k] = static_cast<double>(s[3 + k]) * per_diagonal_;
-    return inside & radii_are_plausible(l[0], l[1], l[2], l[3], l[4], l[5]);
+    return inside && radii_are_plausible(l[0], l[1], l[2], l[3], l[4], l[5]);
 }
 
 bool RecordBounds::admits(const VertexRecord& record) const {
     bool inside = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const float x = record.position[axis];
-        inside &= (x >= vertex_min_[axis]) & (x <= vertex_max_[axis]);
+        inside &= x >= vertex_min_[axis] && x <= vertex_max_[axis];
     }
     return inside;
 }
@@ -112,19 +113,12 @@ bool RecordBounds::admits_ellipsoids(const std::uint8_t* records, std::size_t co
 }
 
 bool RecordBounds::admits_vertices(const std::uint8_t* records, std::size_t count) const {
-    // Blocks of 12 numbers: no branch inside, so that the compiler compares several at once.
-    std::size_t k = 0;
-    std::uint32_t outside = 0;
-    for (; k + kBlock <= count; k += kBlock) {
-        const std::uint8_t* p = records + k * kVertexBytes;
-        for (std::size_t j = 0; j < 3 * kBlock; ++j) {
-            const float x = load_f32(p + 4 * j);
-            outside |= static_cast<std::uint32_t>(!(x >= vertex_min_[j])) |
-                       static_cast<std::uint32_t>(!(x <= vertex_max_[j]));
-        }
+    constexpr std::size_t kBlock = kBoxBlock / 3;
+    const std::size_t blocks = count / kBlock;
+    bool ok = all_inside(records, blocks, vertex_min_, vertex_max_);
+    for (std::size_t k = blocks * kBlock; k < count; ++k) {
+        ok &= admits(load_vertex(records + k * kVertexBytes));
     }
-    bool ok = outside == 0;
-    for (; k < count; ++k) ok &= admits(load_vertex(records + k * kVertexBytes));
     return ok;
 }
 

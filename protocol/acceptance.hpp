@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "protocol/box_check.hpp"
 #include "protocol/datagram.hpp"
 
 namespace ellicast::protocol {
@@ -23,12 +24,10 @@ class RecordBounds {
     [[nodiscard]] bool admits_vertices(const std::uint8_t* records, std::size_t count) const;
 
   private:
-    static constexpr std::size_t kBlock = 4;  // vertices checked side by side
-
-    std::array<float, 3 * kBlock> vertex_min_{};  // x y z, repeated
-    std::array<float, 3 * kBlock> vertex_max_{};
-    std::array<double, 3> center_min_{};
-    std::array<double, 3> center_max_{};
+    BoxBlock vertex_min_;  // x y z, repeated
+    BoxBlock vertex_max_;
+    std::array<double, 3> center_min_;
+    std::array<double, 3> center_max_;
     double per_diagonal_ = 1.0;  // 1 / diagonal of the box
 };
 

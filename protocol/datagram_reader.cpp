@@ -142,18 +142,20 @@ Fault read_sections(Bytes bytes, DatagramView& view) {
     return {};
 }
 
+Fault read_datagram(Bytes bytes, DatagramView& view) {
+    if (const Fault fault = check_envelope(bytes)) return fault;
+    view.header = read_header(bytes);
+    if (const Fault fault = check_header(view.header)) return fault;
+    const std::size_t section_bytes = bytes.size() - kHeaderBytes - kTrailerBytes;
+    return read_sections(bytes.subspan(kHeaderBytes, section_bytes), view);
+}
+
 }  // namespace
 
 Result<DatagramView, WireError> parse_datagram(std::span<const std::uint8_t> bytes) {
-    if (const Fault fault = check_envelope(bytes)) return *fault;
-    DatagramView view;
-    view.header = read_header(bytes);
-    if (const Fault fault = check_header(view.header)) return *fault;
-    const std::size_t section_bytes = bytes.size() - kHeaderBytes - kTrailerBytes;
-    if (const Fault fault = read_sections(bytes.subspan(kHeaderBytes, section_bytes), view)) {
-        return *fault;
-    }
-    return view;
+    Result<DatagramView, WireError> result{DatagramView{}};  // filled in place: it is large to move
+    if (const Fault fault = read_datagram(bytes, *result)) result = *fault;
+    return result;
 }
 
 }  // namespace ellicast::protocol

@@ -12,23 +12,25 @@ namespace ellicast::sender {
 
 /// A model made ready for decomposition. Frame: the file's.
 struct PreparedModel {
-    /// The user's vertices that a triangle uses, in file order; exact duplicates of a position kept once.
-    /// These are what is sent.
+    /// The user's vertices that a triangle uses, in file order; exact duplicates of a position kept
+    /// once. These are what is sent.
     std::vector<Eigen::Vector3d> vertices;
-    /// Closed and consistently oriented (outward): the input with boundary loops capped and non-manifold
-    /// places split. The first vertices.size() positions are `vertices`, copies and cap centres follow.
+    /// Closed and consistently oriented (outward): the input with boundary loops capped and
+    /// non-manifold places split. The first vertices.size() positions are `vertices`, copies and
+    /// cap centres follow; all are used.
     common::TriangleMesh solid;
     /// What was done to get there, one line each, for the user ("filled 5 holes", ...).
     std::vector<std::string> warnings;
 };
 
-/// Strips unreferenced vertices, drops degenerate and duplicate triangles, splits non-manifold edges and
-/// vertices, orients each component consistently and outward, caps boundary loops (fan from the loop's
-/// centroid; a plain triangle for loops of three). Components nested as inner shells (cavities) keep their
-/// inward orientation.
-/// Throws std::invalid_argument with a one-line reason when nothing with a volume remains: no faces, all
-/// degenerate, |volume| below 1e-9 of the cubed diagonal.
-/// Cost: linear up to a sort.
+/// Strips unreferenced vertices, drops degenerate and duplicate triangles, splits non-manifold
+/// edges and vertices, orients each component consistently and outward, caps boundary loops (fan
+/// from the loop's centroid; a plain triangle for loops of three). Components nested as inner
+/// shells (cavities) keep their inward orientation; what lies in the void faces outward, however
+/// the file has it. One-sided surfaces (Moebius) are cut open. Two faces with the same corners that
+/// look opposite ways cancel, unless a whole part is doubled so: then one side stays. Throws
+/// std::invalid_argument with a one-line reason when nothing with a volume remains: no faces, all
+/// degenerate, |volume| below 1e-9 of the cubed diagonal. Cost: linear up to a sort.
 PreparedModel prepare_model(const common::TriangleMesh& input);
 
 /// What the hint says of the shape.
@@ -40,9 +42,12 @@ struct ShapePromise {
     std::string reason;  // why approximate; "" otherwise
 };
 
-/// The topology of the boundary of the union of the solid, as marching cubes on its voxels sees it at 96,
-/// 128, 192 and 256 cells, checked against the model's own (analyse_topology of solid). Where some grid
-/// agrees, that is promised; where none does, the finest grid's is, and approximate is set with the reason.
+/// The topology of the boundary of the union of the solid, as marching cubes on its voxels sees it
+/// at 96, 128, 192 and 256 cells, checked against the model's own (analyse_topology of solid).
+/// Where some grid agrees (and holds between half and twice the volume, so that it has not just
+/// caught a corner), that is promised; where none does, the finest grid's is, and approximate is
+/// set with the reason. A cavity (winding number 0 behind an inner shell) is part of the solid's
+/// boundary, a body inside a body is not. Threads do not change the result.
 ShapePromise promise_topology(const PreparedModel& model, unsigned threads = 0);
 
 }  // namespace ellicast::sender

@@ -154,17 +154,6 @@ std::uint32_t lengthen(const LayoutSizes& sizes, std::uint32_t body, std::uint64
     return body + static_cast<std::uint32_t>(std::max<std::uint64_t>(1, missing / each));
 }
 
-RoundLayout start(const LayoutSizes& sizes) {
-    assert(sizes.ellipsoids >= 1 && sizes.vertices >= 1 && sizes.copies >= 1);
-    assert(sizes.vertex_sections >= 1 && sizes.description_interval >= 1);
-    assert(sizes.payload >= sizes.description + 2 * kSectionHeaderBytes + kEllipsoidBytes);
-    RoundLayout layout;
-    layout.ellipsoids = sizes.ellipsoids;
-    layout.head = head_length(sizes);
-    set_groups(layout, {});
-    return layout;
-}
-
 }  // namespace
 
 std::optional<EllipsoidRun> RoundLayout::ellipsoids_at(std::uint32_t ordinal,
@@ -189,8 +178,13 @@ std::optional<EllipsoidRun> RoundLayout::ellipsoids_at(std::uint32_t ordinal,
 }
 
 RoundLayout lay_out(const LayoutSizes& sizes) {
-    RoundLayout layout = start(sizes);
-    std::uint64_t fewest = ceil_div(sizes.ellipsoids, section_limits(sizes).full);
+    assert(sizes.ellipsoids >= 1 && sizes.vertices >= 1 && sizes.copies >= 1);
+    assert(sizes.vertex_sections >= 1 && sizes.description_interval >= 1);
+    assert(sizes.payload >= sizes.description + 2 * kSectionHeaderBytes + kEllipsoidBytes);
+    RoundLayout layout;
+    layout.ellipsoids = sizes.ellipsoids;
+    layout.head = head_length(sizes);
+    const std::uint64_t fewest = ceil_div(sizes.ellipsoids, section_limits(sizes).full);
     layout.body = static_cast<std::uint32_t>((sizes.copies - 1) * fewest);
     for (;;) {
         std::optional<std::vector<std::uint32_t>> groups =
@@ -200,19 +194,6 @@ RoundLayout lay_out(const LayoutSizes& sizes) {
             continue;
         }
         set_groups(layout, std::move(*groups));
-        const std::uint64_t room = room_in_all(sizes, layout);
-        if (room >= sizes.vertices) break;
-        layout.body = lengthen(sizes, layout.body, room);
-    }
-    share_vertices(sizes, layout);
-    return layout;
-}
-
-RoundLayout lay_out_with_groups(const LayoutSizes& sizes, std::vector<std::uint32_t> groups) {
-    RoundLayout layout = start(sizes);
-    set_groups(layout, std::move(groups));
-    layout.body = layout.sections();
-    for (;;) {
         const std::uint64_t room = room_in_all(sizes, layout);
         if (room >= sizes.vertices) break;
         layout.body = lengthen(sizes, layout.body, room);

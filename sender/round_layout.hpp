@@ -57,7 +57,4 @@ struct RoundLayout {
 /// in the number of datagrams.
 RoundLayout lay_out(const LayoutSizes& sizes);
 
-/// The same with the copies of another layout of the same object.
-RoundLayout lay_out_with_groups(const LayoutSizes& sizes, std::vector<std::uint32_t> groups);
-
 }  // namespace ellicast::sender

@@ -115,16 +115,9 @@ RoundPlan::RoundPlan(BroadcastObject object, const PlanOptions& options)
     sizes.vertices = static_cast<std::uint32_t>(object_.vertices.size());
     sizes.copies = options.copies;
 
-    if (options.rounds == 1) {
-        first_ = lay_out(sizes);
-        return;
-    }
-    // In later rounds a datagram may hold the end of one class and the beginning of the next. They
-    // are a little longer, so their copies fit the first round, too.
-    sizes.vertex_sections = 2;
-    later_ = lay_out(sizes);
-    sizes.vertex_sections = 1;
-    first_ = lay_out_with_groups(sizes, later_->groups);
+    // In later rounds a datagram may hold the end of one class and the beginning of the next.
+    sizes.vertex_sections = options.rounds == 1 ? 1 : 2;
+    layout_ = lay_out(sizes);
     // No class is shorter than a datagram's vertices, so that it holds parts of two at most.
     const std::size_t most = (sizes.payload - kSectionHeaderBytes) / kVertexBytes;
     largest_stride_ =
@@ -133,10 +126,10 @@ RoundPlan::RoundPlan(BroadcastObject object, const PlanOptions& options)
 
 std::vector<std::uint8_t> RoundPlan::datagram(std::uint32_t round, std::uint32_t ordinal,
                                               const Stamp& stamp) const {
-    const std::uint32_t datagrams = layout(round).datagrams();
-    assert(ordinal < datagrams);
+    assert(ordinal < datagrams());
+    assert(options_.rounds == 0 || round < options_.rounds);
     protocol::DatagramHeader header;
-    header.rtp.marker = ordinal + 1 == datagrams;
+    header.rtp.marker = ordinal + 1 == datagrams();
     header.rtp.sequence = stamp.sequence;
     header.rtp.timestamp = stamp.timestamp;
     header.rtp.ssrc = stamp.ssrc;
@@ -146,7 +139,7 @@ std::vector<std::uint8_t> RoundPlan::datagram(std::uint32_t round, std::uint32_t
     header.round = round;
     header.rounds = options_.rounds;
     header.ordinal = ordinal;
-    header.datagrams = datagrams;
+    header.datagrams = datagrams();
 
     protocol::DatagramWriter writer(header, options_.datagram_bytes);
     if (ordinal % description_interval_ == 0) {
@@ -160,7 +153,7 @@ std::vector<std::uint8_t> RoundPlan::datagram(std::uint32_t round, std::uint32_t
 
 void RoundPlan::add_ellipsoids(protocol::DatagramWriter& writer, std::uint32_t round,
                                std::uint32_t ordinal) const {
-    const auto run = layout(round).ellipsoids_at(ordinal, round);
+    const auto run = layout_.ellipsoids_at(ordinal, round);
     if (!run) return;
     writer.add_ellipsoids(run->first, run->stride,
                           pick(object_.ellipsoids, run->first, run->stride, run->count));
@@ -168,11 +161,11 @@ void RoundPlan::add_ellipsoids(protocol::DatagramWriter& writer, std::uint32_t r
 
 void RoundPlan::add_vertices(protocol::DatagramWriter& writer, std::uint32_t round,
                              std::uint32_t ordinal) const {
-    const RoundLayout& places = layout(round);
-    std::uint32_t left = places.first_vertex[ordinal + 1] - places.first_vertex[ordinal];
+    const std::uint32_t begin = layout_.first_vertex[ordinal];
+    std::uint32_t left = layout_.first_vertex[ordinal + 1] - begin;
     const VertexOrder order = vertex_order(object_, round, largest_stride_);
-    auto position = static_cast<std::uint32_t>(
-        (std::uint64_t{places.first_vertex[ordinal]} + order.start) % order.vertices);
+    auto position =
+        static_cast<std::uint32_t>((std::uint64_t{begin} + order.start) % order.vertices);
     while (left > 0) {
         const std::uint32_t j = order.class_of(position);
         const std::uint32_t count = std::min(left, order.class_begin(j + 1) - position);

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "protocol/datagram.hpp"
@@ -50,14 +49,13 @@ class RoundPlan {
 
     [[nodiscard]] const BroadcastObject& object() const { return object_; }
     /// Of every ellipsoid in a round.
-    [[nodiscard]] std::size_t copies() const { return 1 + first_.groups.size(); }
+    [[nodiscard]] std::size_t copies() const { return 1 + layout_.groups.size(); }
     /// Datagrams from one description to the next.
     [[nodiscard]] std::uint32_t description_interval() const { return description_interval_; }
 
-    /// Datagrams in this round. All rounds but the first have the same number.
-    [[nodiscard]] std::uint32_t datagrams(std::uint32_t round) const {
-        return layout(round).datagrams();
-    }
+    /// Datagrams in each round.
+    [[nodiscard]] std::uint32_t datagrams() const { return layout_.datagrams(); }
+    [[nodiscard]] std::uint32_t rounds() const { return options_.rounds; }
     /// Datagram `ordinal` of `round`, at most datagram_bytes, complete with checksum. A function of
     /// the object, the options and the arguments alone. Requires ordinal < datagrams(round)
     /// (asserted).
@@ -65,9 +63,6 @@ class RoundPlan {
                                                      const Stamp& stamp) const;
 
   private:
-    [[nodiscard]] const RoundLayout& layout(std::uint32_t round) const {
-        return round > 0 && later_ ? *later_ : first_;
-    }
     void add_ellipsoids(protocol::DatagramWriter& writer, std::uint32_t round,
                         std::uint32_t ordinal) const;
     void add_vertices(protocol::DatagramWriter& writer, std::uint32_t round,
@@ -77,8 +72,7 @@ class RoundPlan {
     PlanOptions options_;
     std::uint32_t description_interval_ = 1;
     std::uint32_t largest_stride_ = 1;
-    RoundLayout first_;
-    std::optional<RoundLayout> later_;  // absent when there is one round only
+    RoundLayout layout_;
 };
 
 }  // namespace ellicast::sender

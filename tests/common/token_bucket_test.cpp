@@ -20,6 +20,7 @@ TEST_CASE("under steady demand the k-th datagram leaves when the bits before it 
     const std::size_t bytes = GENERATE(1u, 604u, 1248u, 65'555u);
     const Time epoch = GENERATE(Time(0), Time(1'234'567'891'234'567), Time(-5'000'000'000));
     TokenBucket bucket(rate, 5ms);
+    CHECK(bucket.ready_at() == Time::min());
     Time now = epoch;
     for (std::uint64_t k = 0; k < 1000; ++k) {
         // Closed form: ceil(k * bits / rate) ns, in exact integers.

@@ -253,6 +253,11 @@ TriangleMesh edge_shared_by_four() {
     return two_unit_cubes({1, 1, 0});
 }
 
+TriangleMesh edge_touching_itself() {
+    const auto filled = [](int i, int j, int k) { return k != 1 || i == j; };
+    return cell_surface({2, 2, 3}, Vector3d::Ones(), Vector3d::Zero(), filled);
+}
+
 TriangleMesh vertex_shared_by_two() {
     return two_unit_cubes({1, 1, 1});
 }

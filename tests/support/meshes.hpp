@@ -26,6 +26,7 @@ common::TriangleMesh two_parts();                 // two disjoint spheres
 common::TriangleMesh overlapping_parts();         // two spheres that intersect
 common::TriangleMesh nested_shells();             // a sphere with a spherical cavity
 common::TriangleMesh edge_shared_by_four();       // two cubes that share an edge
+common::TriangleMesh edge_touching_itself();      // two 2 x 2 x 1 plates on two diagonal pillars
 common::TriangleMesh vertex_shared_by_two();      // two cubes that share a corner
 common::TriangleMesh with_degenerates();          // a cube with zero-area and duplicate triangles
 common::TriangleMesh inconsistent_orientation();  // a sphere with every second triangle flipped

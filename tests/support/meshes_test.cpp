@@ -77,6 +77,8 @@ TEST_CASE("the zoo has the faults it is kept for") {
     check_closed(nested_shells(), 4, 4.0 / 3.0 * std::numbers::pi * 0.875, 0.1);
     CHECK(edge_shared_by_four().positions.size() == 14);
     CHECK(census(edge_shared_by_four()).repeated_edges == 2);
+    CHECK(census(edge_touching_itself()).repeated_edges == 2);
+    CHECK(census(edge_touching_itself()).volume == Approx(10.0));
     CHECK(vertex_shared_by_two().positions.size() == 15);
     check_closed(vertex_shared_by_two(), 3, 2.0, 1e-12);
     CHECK(with_degenerates().triangles.size() == 18);

@@ -1,0 +1,131 @@
+// sender/model_loading.cpp
+#include "sender/model_loading.hpp"
+
+#include <chrono>
+#include <ctime>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "common/model_io.hpp"
+
+namespace ellicast::sender {
+namespace {
+
+namespace fs = std::filesystem;
+
+double cpu_seconds() {
+    std::timespec time{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// Runs a stage and notes what it took.
+template <class Work>
+auto timed(std::vector<StageTime>& stages, const char* stage, const Work& work) {
+    const auto wall = std::chrono::steady_clock::now();
+    const double cpu = cpu_seconds();
+    auto result = work();
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - wall;
+    stages.push_back({stage, took.count(), cpu_seconds() - cpu});
+    return result;
+}
+
+/// Geometry says what is wrong with a model; the user wants to know with which.
+template <class Work>
+auto naming(const fs::path& path, const Work& work) {
+    try {
+        return work();
+    } catch (const std::invalid_argument& error) {
+        throw common::ModelError(path.string() + ": " + error.what());
+    }
+}
+
+/// The directory when it can be used, else a warning.
+std::optional<fs::path> usable(const std::optional<fs::path>& cache,
+                               std::vector<std::string>& warnings) {
+    if (!cache) return std::nullopt;
+    std::error_code error;
+    fs::create_directories(*cache, error);
+    if (!error && fs::is_directory(*cache, error)) return cache;
+    warnings.push_back("cache " + cache->string() +
+                       " is not used: " + (error ? error.message() : "not a directory"));
+    return std::nullopt;
+}
+
+struct Decomposed {
+    PreparedModel model;
+    Decomposition decomposition;
+    std::string key;
+};
+
+PreparedModel prepared(const fs::path& path, LoadedModel& loaded) {
+    const common::TriangleMesh input =
+        timed(loaded.stages, "read", [&] { return common::read_model(path); });
+    PreparedModel model = timed(loaded.stages, "prepare",
+                                [&] { return naming(path, [&] { return prepare_model(input); }); });
+    loaded.warnings = model.warnings;
+    return model;
+}
+
+/// From the cache, or computed and then cached.
+Decomposed decomposed(const fs::path& path, const DecompositionOptions& options,
+                      const std::optional<fs::path>& cache, LoadedModel& loaded) {
+    Decomposed result;
+    result.model = prepared(path, loaded);
+    result.key = decomposition_key(result.model.solid, options);
+    const std::optional<fs::path> directory = usable(cache, loaded.warnings);
+    const fs::path file = directory.value_or(fs::path()) / (result.key + ".ellipsoids");
+    if (directory) {
+        std::optional<Decomposition> found =
+            timed(loaded.stages, "cache", [&] { return read_decomposition(file, result.key); });
+        loaded.cached = found.has_value();
+        if (found) result.decomposition = *std::move(found);
+    }
+    if (!loaded.cached) {
+        result.decomposition = timed(loaded.stages, "decompose", [&] {
+            return naming(path, [&] { return decompose(result.model.solid, options); });
+        });
+    }
+    if (directory && !loaded.cached) {
+        try {
+            write_decomposition(file, result.key, result.decomposition);
+        } catch (const common::ModelError& error) {
+            loaded.warnings.push_back("not cached: " + std::string(error.what()));
+        }
+    }
+    loaded.path = path;
+    loaded.decomposition = result.decomposition;
+    loaded.decomposition.ellipsoids.clear();
+    return result;
+}
+
+}  // namespace
+
+LoadedModel load_model(const fs::path& path, const DecompositionOptions& options,
+                       const std::optional<fs::path>& cache) {
+    LoadedModel loaded;
+    const Decomposed source = decomposed(path, options, cache, loaded);
+    loaded.promise = timed(loaded.stages, "promise",
+                           [&] { return promise_topology(source.model, options.threads); });
+    loaded.object = timed(loaded.stages, "object", [&] {
+        return naming(path, [&] {
+            return make_object(source.model, loaded.promise, source.decomposition,
+                               {path.stem().string(), options.seed});
+        });
+    });
+    if (loaded.promise.approximate) {
+        loaded.warnings.push_back("topology promised only approximately: " + loaded.promise.reason);
+    }
+    return loaded;
+}
+
+LoadedModel decompose_to_file(const fs::path& path, const DecompositionOptions& options,
+                              const std::optional<fs::path>& cache, const fs::path& output) {
+    LoadedModel loaded;
+    const Decomposed source = decomposed(path, options, cache, loaded);
+    write_decomposition(output, source.key, source.decomposition);
+    return loaded;
+}
+
+}  // namespace ellicast::sender

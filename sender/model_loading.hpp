@@ -1,0 +1,47 @@
+// sender/model_loading.hpp
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sender/broadcast_object.hpp"
+#include "sender/decomposition.hpp"
+#include "sender/model_preparation.hpp"
+
+namespace ellicast::sender {
+
+/// What one stage took; CPU over all threads of the program.
+struct StageTime {
+    std::string stage;
+    double wall_s = 0;
+    double cpu_s = 0;
+};
+
+/// A model ready for sending, and the story of how it came to be.
+struct LoadedModel {
+    std::filesystem::path path;
+    BroadcastObject object;  // empty when the model was only decomposed
+    ShapePromise promise;
+    Decomposition decomposition;        // without the ellipsoids: those are in the object
+    bool cached = false;                // the decomposition was found, not computed
+    std::vector<StageTime> stages;      // read, prepare, cache, decompose, promise, object
+    std::vector<std::string> warnings;  // of preparation, cache and promise
+};
+
+/// Reads a model file, prepares and decomposes it, and makes its object, which is named after the
+/// file's stem and has the seed of the decomposition. The cache's directory is made when missing;
+/// when it cannot be used, that is a warning. Throws common::ModelError, one line that names the
+/// path and the reason.
+LoadedModel load_model(const std::filesystem::path& path, const DecompositionOptions& options,
+                       const std::optional<std::filesystem::path>& cache);
+
+/// The same up to the decomposition, which is written to `output`. Throws common::ModelError.
+LoadedModel decompose_to_file(const std::filesystem::path& path,
+                              const DecompositionOptions& options,
+                              const std::optional<std::filesystem::path>& cache,
+                              const std::filesystem::path& output);
+
+}  // namespace ellicast::sender

@@ -1,0 +1,251 @@
+// sender/options.cpp
+#include "sender/options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+#include "common/loss_options.hpp"
+#include "common/number_text.hpp"
+#include "common/text_values.hpp"
+
+namespace ellicast::sender {
+namespace {
+
+constexpr const char* kExamples = R"(
+Examples:
+  ellicast-send horse.ply --to 192.0.2.7
+      one round at 20 Mbit/s to port 5004
+  ellicast-send horse.ply --to [2001:db8::7]:6000 --rate 2M --rounds forever
+      a slow carousel, until Ctrl-C
+  ellicast-send horse.ply bunny.obj --to 192.0.2.7 --cache ~/.cache/ellicast
+      two models, one after the other; the next start streams at once
+  ellicast-send horse.ply --to 127.0.0.1 --drop 0.3 --loss-seed 7 --report sent.json
+      lose three datagrams in ten on purpose, after numbering
+  ellicast-send horse.ply --decompose-only horse.ellipsoids
+      compute the ellipsoids and send nothing
+
+Exit codes: 0 done, 2 usage or input error.)";
+
+const std::map<std::string, Criterion> kCriteria{{"volume", Criterion::volume},
+                                                 {"robust", Criterion::robust}};
+const std::vector<std::string> kLogLevels{"trace", "debug", "info", "warn", "error", "off"};
+constexpr const char* kIdentityGroup = "Identity of the stream (random unless given; for tests)";
+
+// Texts as they come from the command line, before they mean anything.
+struct Texts {
+    std::string to;
+    std::string rate = "20M";
+    std::string rounds = "1";
+    std::string cache;
+    std::string decompose_only;
+    std::string report;
+    std::string session;
+};
+
+std::uint64_t rate_of(const std::string& text) {
+    return text == "0" ? 0 : common::parse_rate(text);
+}
+
+std::uint32_t rounds_of(const std::string& text) {
+    if (text == "forever") return 0;
+    const auto rounds = common::number<std::uint32_t>(text);
+    if (!rounds) throw common::refusal(text, "is not a number of rounds, nor 'forever'");
+    return *rounds;
+}
+
+common::Endpoint destination_of(const std::string& text) {
+    common::Endpoint destination = common::parse_endpoint(text);
+    if (destination.host.empty()) throw common::refusal(text, "has no host");
+    if (destination.port == 0) throw common::refusal(text, "nobody can be reached on port 0");
+    return destination;
+}
+
+protocol::SessionId session_of(const std::string& text) {
+    protocol::SessionId session{};
+    const auto digit = [](char c) {
+        if (c >= '0' && c <= '9') return c - '0';
+        if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+        if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+        return -1;
+    };
+    bool ok = text.size() == 2 * session.size();
+    for (std::size_t k = 0; ok && k < session.size(); ++k) {
+        const int high = digit(text[2 * k]);
+        const int low = digit(text[2 * k + 1]);
+        ok = high >= 0 && low >= 0;
+        session[k] = static_cast<std::uint8_t>(16 * high + low);
+    }
+    if (!ok) throw common::refusal(text, "is not a session id of 16 hex digits");
+    return session;
+}
+
+/// Refuses what `parse` refuses, with its words.
+template <class Parse>
+CLI::Validator accepted_by(Parse parse) {
+    const auto check = [parse](std::string& text) -> std::string {
+        try {
+            parse(text);
+            return "";
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+    };
+    return {check, ""};
+}
+
+/// A whole number from low to high; unlike CLI's own conversion, refuses signs and what does not
+/// fit.
+template <class T>
+CLI::Option* add_number(CLI::App& app, const std::string& name, T& value, T low, T high,
+                        const std::string& help) {
+    const auto check = [low, high](std::string& text) -> std::string {
+        const auto number = common::number<T>(text);
+        if (number && *number >= low && *number <= high) return "";
+        return "'" + text + "' is not a whole number from " + std::to_string(low) + " to " +
+               std::to_string(high);
+    };
+    return app.add_option(name, value, help)
+        ->check(CLI::Validator(check, ""))
+        ->type_name("N")
+        ->capture_default_str();
+}
+
+void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
+    DecompositionOptions& geometry = options.decomposition;
+    app.add_option("MODEL", options.models, "PLY, OBJ, OFF or STL files to send")
+        ->type_name("")
+        ->required();
+    add_number<std::size_t>(app, "--ellipsoids", geometry.ellipsoids, 1, protocol::kMaxEllipsoids,
+                            "Ellipsoids that approximate the volume");
+    add_number<std::size_t>(app, "--candidates", geometry.candidates, 1, 10'000'000,
+                            "Seeds to grow candidates from");
+    app.add_option("--criterion", geometry.criterion, "How to select them")
+        ->type_name("RULE")
+        ->transform(CLI::CheckedTransformer(kCriteria).description("{volume,robust}"))
+        ->default_str("robust");
+    add_number<std::uint64_t>(
+        app, "--seed", geometry.seed, 0, std::numeric_limits<std::uint64_t>::max(),
+        "Of seeds and of the order of vertices; another seed, another object");
+    add_number<unsigned>(app, "--threads", geometry.threads, 0, 1024,
+                         "Threads for geometry; 0: one per core");
+    app.add_option("--cache", texts.cache, "Keep decompositions here, and take them from here")
+        ->type_name("DIR");
+    app.add_option("--decompose-only", texts.decompose_only,
+                   "Write the decomposition of one model and end")
+        ->type_name("FILE");
+}
+
+void add_stream_options(CLI::App& app, Options& options, Texts& texts) {
+    app.add_option("--to", texts.to,
+                   "Where to send; IPv6 addresses in brackets, port 5004 by default")
+        ->type_name("HOST[:PORT]")
+        ->check(accepted_by(destination_of));
+    app.add_option("--rate", texts.rate,
+                   "Bits per second, IP and UDP headers included; k, M, G; 0: unpaced")
+        ->type_name("RATE")
+        ->check(accepted_by(rate_of))
+        ->capture_default_str();
+    app.add_option("--rounds", texts.rounds, "Times to send everything, or forever")
+        ->type_name("N")
+        ->check(accepted_by(rounds_of))
+        ->capture_default_str();
+    add_number<std::size_t>(app, "--copies", options.copies, 1, 64,
+                            "Of every ellipsoid in a round; large models get more; 1: just one");
+    add_number<std::size_t>(app, "--datagram", options.datagram_bytes, protocol::kMinDatagramBytes,
+                            protocol::kMaxDatagramBytes, "UDP payload in bytes, at most");
+}
+
+void add_program_options(CLI::App& app, Options& options, Texts& texts) {
+    app.add_option("--report", texts.report, "JSON of what was made and sent")->type_name("FILE");
+    app.add_option("--log-level", options.log_level, "trace, debug, info, warn, error or off")
+        ->type_name("LEVEL")
+        ->check(CLI::IsMember(kLogLevels).description(""))
+        ->capture_default_str();
+    app.add_flag("-q,--quiet", options.quiet, "Only warnings and errors; no progress, no summary");
+    app.set_config("--config", "", "Read options from a file, lines of name=value")
+        ->type_name("FILE");
+    app.set_version_flag("--version", "ellicast-send " ELLICAST_VERSION);
+    common::add_loss_options(app, options.impairment);
+}
+
+/// For an optional number that stays empty unless given.
+template <class T>
+void add_identity_number(CLI::App& app, const std::string& name, std::optional<T>& value,
+                         const std::string& help) {
+    app.add_option_function<std::string>(
+           name,
+           [name, &value](const std::string& text) {
+               value = common::number<T>(text);
+               if (!value) {
+                   throw CLI::ValidationError(name,
+                                              "'" + text + "' is not a whole number from 0 to " +
+                                                  std::to_string(std::numeric_limits<T>::max()));
+               }
+           },
+           help)
+        ->type_name("N")
+        ->group(kIdentityGroup);
+}
+
+void add_identity_options(CLI::App& app, Options& options, Texts& texts) {
+    app.add_option("--session", texts.session, "Session id")
+        ->type_name("HEX")
+        ->check(accepted_by(session_of))
+        ->group(kIdentityGroup);
+    add_identity_number(app, "--ssrc", options.identity.ssrc, "RTP source");
+    add_identity_number(app, "--first-sequence", options.identity.first_sequence,
+                        "RTP sequence number of the first datagram");
+    add_identity_number(app, "--first-timestamp", options.identity.first_timestamp,
+                        "RTP timestamp of the first datagram");
+}
+
+void interpret(const Texts& texts, Options& options) {
+    const auto path_of = [](const std::string& text) -> std::optional<std::filesystem::path> {
+        if (text.empty()) return std::nullopt;
+        return text;
+    };
+    options.cache = path_of(texts.cache);
+    options.decompose_only = path_of(texts.decompose_only);
+    options.report = path_of(texts.report);
+    options.bits_per_second = rate_of(texts.rate);
+    options.rounds = rounds_of(texts.rounds);
+    if (!texts.session.empty()) options.identity.session = session_of(texts.session);
+    if (!texts.to.empty()) {
+        const common::Endpoint destination = destination_of(texts.to);
+        options.host = destination.host;
+        options.port = destination.port.value_or(options.port);
+    } else if (!options.decompose_only) {
+        throw CLI::RequiredError("--to");
+    }
+    if (options.decompose_only && options.models.size() > 1) {
+        throw CLI::ValidationError("--decompose-only", "takes one model");
+    }
+}
+
+}  // namespace
+
+std::variant<Options, int> parse_options(int argc, const char* const* argv) {
+    Options options;
+    Texts texts;
+    CLI::App app("Broadcasts 3D models over networks that lose packets.", "ellicast-send");
+    app.footer(kExamples);
+    app.allow_config_extras(CLI::config_extras_mode::error);
+    app.failure_message([](const CLI::App*, const CLI::Error& error) {
+        return "ellicast-send: " + std::string(error.what()) + " (see --help)\n";
+    });
+    add_geometry_options(app, options, texts);
+    add_stream_options(app, options, texts);
+    add_program_options(app, options, texts);
+    add_identity_options(app, options, texts);
+    try {
+        app.parse(argc, argv);
+        interpret(texts, options);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
+    return options;
+}
+
+}  // namespace ellicast::sender

@@ -1,0 +1,123 @@
+// sender/report.cpp
+#include "sender/report.hpp"
+
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "common/atomic_file.hpp"
+#include "common/model_io.hpp"
+
+namespace ellicast::sender {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::string hex(const protocol::ObjectId& id) {
+    constexpr const char* kDigits = "0123456789abcdef";
+    std::string text;
+    for (const std::uint8_t byte : id) {
+        text += kDigits[byte >> 4];
+        text += kDigits[byte & 15];
+    }
+    return text;
+}
+
+ordered_json object_json(const LoadedModel& model, const RoundPlan& plan) {
+    const BroadcastObject& object = plan.object();
+    ordered_json json;
+    json["name"] = object.description.name;
+    json["object_id"] = hex(object.id);
+    json["vertices"] = object.vertices.size();
+    json["ellipsoids"] = object.ellipsoids.size();
+    json["copies"] = plan.copies();
+    json["datagrams"] = plan.datagrams();
+    json["origin"] = object.description.origin;
+    json["topology"] = {{"components", model.promise.components},
+                        {"euler_all", model.promise.euler_all},
+                        {"euler_largest", model.promise.euler_largest},
+                        {"approximate", model.promise.approximate},
+                        {"reason", model.promise.reason}};
+    return json;
+}
+
+ordered_json model_json(const LoadedModel& model, const RoundPlan* plan) {
+    ordered_json json;
+    json["model"] = model.path.string();
+    if (plan) json.update(object_json(model, *plan));
+    json["decomposition"] = {{"seeds", model.decomposition.seeds},
+                             {"candidates", model.decomposition.candidates},
+                             {"covered", model.decomposition.covered},
+                             {"outside", model.decomposition.outside},
+                             {"cached", model.cached}};
+    json["seconds"] = ordered_json::object();
+    for (const StageTime& stage : model.stages) {
+        json["seconds"][stage.stage] = {{"wall", stage.wall_s}, {"cpu", stage.cpu_s}};
+    }
+    json["warnings"] = model.warnings;
+    return json;
+}
+
+ordered_json sending_json(const Options& options, const SendOutcome& outcome) {
+    const SessionCounts& session = outcome.session;
+    const EndpointCounts& endpoint = outcome.endpoint;
+    ordered_json json;
+    json["to"] = outcome.peer;
+    json["rounds"] = session.rounds;
+    json["interrupted"] = outcome.interrupted;
+    json["seconds"] = outcome.seconds;
+    json["rate"] = {{"asked", options.bits_per_second}, {"achieved", achieved_rate(outcome)}};
+    json["datagrams"] = {{"offered", session.offered},
+                         {"sent", endpoint.sent},
+                         {"dropped_by_simulation", session.dropped},
+                         {"duplicated_by_simulation", session.duplicated},
+                         {"refused", endpoint.refused},
+                         {"unreachable", endpoint.unreachable},
+                         {"socket_full", endpoint.socket_full},
+                         {"bytes", endpoint.bytes}};
+    return json;
+}
+
+}  // namespace
+
+double achieved_rate(const SendOutcome& outcome) {
+    const std::uint64_t bytes =
+        outcome.endpoint.bytes + outcome.endpoint.sent * outcome.ip_udp_bytes;
+    return outcome.seconds > 0 ? 8.0 * static_cast<double>(bytes) / outcome.seconds : 0.0;
+}
+
+std::string report_json(const Options& options, const std::vector<LoadedModel>& models,
+                        const std::vector<RoundPlan>& plans,
+                        const std::optional<SendOutcome>& outcome) {
+    ordered_json json;
+    json["program"] = "ellicast-send";
+    json["version"] = ELLICAST_VERSION;
+    json["models"] = ordered_json::array();
+    for (std::size_t k = 0; k < models.size(); ++k) {
+        json["models"].push_back(model_json(models[k], k < plans.size() ? &plans[k] : nullptr));
+    }
+    if (outcome) json["sending"] = sending_json(options, *outcome);
+    // File names need not be UTF-8, JSON must.
+    return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+void write_report(const std::filesystem::path& path, const std::string& json) {
+    try {
+        common::write_file_atomically(path, json);
+    } catch (const common::WriteFailure& reason) {
+        throw common::ModelError(path.string() + ": cannot be written: " + reason.what());
+    }
+}
+
+void check_writable(const std::filesystem::path& path) {
+    namespace fs = std::filesystem;
+    std::error_code error;
+    const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    if (fs::is_directory(path, error)) {
+        throw common::ModelError(path.string() + ": cannot be written: is a directory");
+    }
+    if (!fs::is_directory(parent, error)) {
+        throw common::ModelError(path.string() + ": cannot be written: no such directory");
+    }
+}
+
+}  // namespace ellicast::sender

@@ -1,0 +1,68 @@
+// sender/report.hpp
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sender/model_loading.hpp"
+#include "sender/options.hpp"
+#include "sender/session.hpp"
+#include "sender/udp_endpoint.hpp"
+
+namespace ellicast::sender {
+
+/// What the sending came to.
+struct SendOutcome {
+    std::string peer;
+    SessionCounts session;
+    EndpointCounts endpoint;
+    std::size_t ip_udp_bytes = 28;
+    double seconds = 0;        // from the first datagram to the last
+    bool interrupted = false;  // by a signal, before the last round was over
+};
+
+/// Bits per second that left the sockets, headers below the payload included; 0 when nothing was
+/// sent.
+double achieved_rate(const SendOutcome& outcome);
+
+/// The JSON of --report:
+///   program, version
+///   models[]: one object each
+///     model          path as given
+///     name           as broadcast
+///     object_id      16 hex digits; this and the next five keys are absent after --decompose-only
+///     vertices, ellipsoids   distinct records
+///     copies         of every ellipsoid in a round
+///     datagrams      in a round
+///     origin         [x, y, z] subtracted before the wire
+///     topology       {components, euler_all, euler_largest, approximate, reason}
+///     decomposition  {seeds, candidates, covered, outside, cached}; shares of the solid's voxels
+///     seconds        {stage: {wall, cpu}} for read, prepare, cache, decompose, promise, object
+///     warnings       [text]
+///   sending          absent after --decompose-only
+///     to             address and port
+///     rounds         whole ones sent
+///     interrupted    true when a signal ended it
+///     seconds        wall clock
+///     rate           {asked, achieved}: bits per second, IP and UDP headers included; asked 0:
+///     unpaced datagrams      {offered, sent, dropped_by_simulation, duplicated_by_simulation,
+///     refused,
+///                     unreachable, socket_full, bytes}; see SessionCounts and EndpointCounts.
+///                     bytes are UDP payload of those sent. offered + duplicated = sent + dropped +
+///                     refused, unless interrupted.
+/// Plans are those of the models, in order, or none.
+std::string report_json(const Options& options, const std::vector<LoadedModel>& models,
+                        const std::vector<RoundPlan>& plans,
+                        const std::optional<SendOutcome>& outcome);
+
+/// Throws common::ModelError when it cannot be written.
+void write_report(const std::filesystem::path& path, const std::string& json);
+
+/// Throws common::ModelError when a file obviously cannot be made there (no such directory, a
+/// directory in its place), so that one learns it before the work and not after.
+void check_writable(const std::filesystem::path& path);
+
+}  // namespace ellicast::sender

@@ -1,0 +1,122 @@
+// sender/session.cpp
+#include "sender/session.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+#include "protocol/section_filter.hpp"
+
+namespace ellicast::sender {
+namespace {
+
+using common::BernoulliLoss;
+using common::LossSequence;
+using common::LossStream;
+
+// What a late wake-up may catch up on. Twice what a busy desktop oversleeps, and 12 kB at 20
+// Mbit/s: no receiver's buffer minds.
+constexpr Time kBurst = std::chrono::milliseconds(5);
+
+LossSequence section_loss(double probability, std::uint64_t seed, LossStream stream) {
+    return {BernoulliLoss{probability}, common::stream_seed(seed, stream)};
+}
+
+/// 90 kHz ticks; wraps around as RTP wants it.
+std::uint32_t rtp_ticks(Time elapsed) {
+    constexpr std::int64_t kNanosecondsPer9Ticks = 100'000;
+    static_assert(protocol::kRtpClockHz == 90'000);
+    return static_cast<std::uint32_t>(static_cast<std::uint64_t>(elapsed.count()) * 9 /
+                                      kNanosecondsPer9Ticks);
+}
+
+}  // namespace
+
+Session::Session(std::vector<RoundPlan> plans, const SessionOptions& options)
+    : plans_(std::move(plans)),
+      options_(options),
+      impairment_(options.impairment),
+      lost_ellipsoids_(section_loss(options.impairment.drop_ellipsoids, options.impairment.seed,
+                                    LossStream::ellipsoids)),
+      lost_vertices_(section_loss(options.impairment.drop_vertices, options.impairment.seed,
+                                  LossStream::vertices)),
+      sequence_(options.first_sequence) {
+    assert(!plans_.empty());
+    assert(std::all_of(plans_.begin(), plans_.end(), [&](const RoundPlan& plan) {
+        return plan.rounds() == plans_.front().rounds();
+    }));
+    if (options.bits_per_second > 0) bucket_.emplace(options.bits_per_second, kBurst);
+}
+
+void Session::poll(Time now, std::vector<Datagram>& out) {
+    if (done_) return;
+    if (!start_) start_ = now;
+    if (now < *start_) return;
+    const std::uint32_t timestamp = options_.first_timestamp + rtp_ticks(now - *start_);
+    for (std::size_t k = 0; k < kBatch && !done_; ++k) {
+        if (bucket_ && bucket_->ready_at() > now) break;
+        Datagram datagram =
+            plans_[plan_].datagram(round_, ordinal_, {sequence_, timestamp, options_.ssrc});
+        if (bucket_) {
+            [[maybe_unused]] const bool paid =
+                bucket_->take(now, datagram.size() + options_.ip_udp_bytes);
+            assert(paid);
+        }
+        ++sequence_;
+        ++counts_.offered;
+        offer(std::move(datagram), out);
+        advance();
+    }
+    if (done_) impairment_.flush(out);
+    counts_.dropped = left_empty_ + impairment_.counts().dropped;
+    counts_.duplicated = impairment_.counts().duplicated;
+}
+
+Time Session::next_wakeup() const {
+    return bucket_ ? bucket_->ready_at() : Time::min();
+}
+
+std::optional<std::uint64_t> Session::datagrams_in_all() const {
+    if (plans_.front().rounds() == 0) return std::nullopt;
+    std::uint64_t in_a_round = 0;
+    for (const RoundPlan& plan : plans_) in_a_round += plan.datagrams();
+    return in_a_round * plans_.front().rounds();
+}
+
+void Session::offer(Datagram datagram, std::vector<Datagram>& out) {
+    const common::ImpairmentOptions& loss = options_.impairment;
+    if (loss.drop_ellipsoids > 0 || loss.drop_vertices > 0) {
+        const auto keep = [&](const protocol::SectionView& section) {
+            if (section.kind == protocol::SectionKind::ellipsoids) {
+                return !lost_ellipsoids_.next_is_lost();
+            }
+            if (section.kind == protocol::SectionKind::vertices) {
+                return !lost_vertices_.next_is_lost();
+            }
+            return true;
+        };
+        std::optional<Datagram> rest = protocol::keep_sections(datagram, keep);
+        if (!rest) {
+            ++left_empty_;
+            return;
+        }
+        datagram = *std::move(rest);
+    }
+    if (loss.any()) {
+        impairment_.offer(std::move(datagram), out);
+    } else {
+        out.push_back(std::move(datagram));
+    }
+}
+
+void Session::advance() {
+    if (++ordinal_ < plans_[plan_].datagrams()) return;
+    ordinal_ = 0;
+    if (++plan_ < plans_.size()) return;
+    plan_ = 0;
+    ++counts_.rounds;
+    ++round_;
+    done_ = plans_.front().rounds() != 0 && round_ == plans_.front().rounds();
+}
+
+}  // namespace ellicast::sender
