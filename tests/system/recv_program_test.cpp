@@ -73,8 +73,11 @@ struct Receiver {
     explicit Receiver(Arguments more = {}, const std::string& listen = "127.0.0.1:0",
                       const std::string& output_name = "out.ply") {
         output = directory.path().string() + "/" + output_name;
-        Arguments arguments{"--listen",    listen,           "--output", output,   "--report",
-                            report_path(), "--idle-timeout", "0.5",      "--grid", "24"};
+        Arguments arguments{"--listen", listen,        "--output",       output,
+                            "--report", report_path(), "--idle-timeout", "0.5"};
+        if (std::find(more.begin(), more.end(), "--grid") == more.end()) {
+            arguments.insert(arguments.end(), {"--grid", "24"});
+        }
         arguments.insert(arguments.end(), more.begin(), more.end());
         process.emplace(ELLICAST_RECV, arguments);
     }
@@ -288,6 +291,32 @@ TEST_CASE("a signal keeps what was received") {
     CHECK(receiver.report()["ends_by"] == "interrupted");
     CHECK(receiver.report()["datagrams"]["received"] == 9);
     CHECK(common::analyse_topology(common::read_model(receiver.output)).closed);
+}
+
+TEST_CASE("a signal while the result is made is forgiven once") {
+    Receiver receiver({"--log-level", "debug", "--grid", "64"});
+    Sender(receiver.port()).send(made_datagrams(sphere()));
+    REQUIRE(receiver.process->await_err("stage coarse"));
+    receiver.process->send_signal(SIGINT);
+    REQUIRE(receiver.process->await_err("once more to abort"));
+    SECTION("then all goes on") {
+        CHECK(receiver.process->wait() == 0);
+        CHECK(std::filesystem::exists(receiver.output));
+    }
+    SECTION("the second one aborts, and leaves no half file") {
+        receiver.process->send_signal(SIGINT);
+        CHECK(receiver.process->wait() == 128 + SIGINT);
+        CHECK_FALSE(std::filesystem::exists(receiver.output));
+    }
+}
+
+TEST_CASE("an interrupted reception does not forgive another signal") {
+    Receiver receiver({"--log-level", "debug", "--grid", "64", "--until", "forever"});
+    Sender(receiver.port()).send(made_datagrams(sphere()));
+    receiver.process->send_signal(SIGINT);
+    REQUIRE(receiver.process->await_err("stage coarse"));
+    receiver.process->send_signal(SIGINT);
+    CHECK(receiver.process->wait() == 128 + SIGINT);
 }
 
 TEST_CASE("quiet says nothing but what went wrong") {
