@@ -92,8 +92,8 @@ Miss miss(const common::MeshTopology& topology, const PromisedTopology& promise)
             std::abs(topology.euler_largest - promise.euler_largest)};
 }
 
-// The field's value at the received points, as a smooth function of space: sums on a coarse lattice, one node in
-// kBlockCells cells of the grid.
+// The field's value at the received points, as a smooth function of space: sums on a coarse
+// lattice, one node in kBlockCells cells of the grid.
 class LocalIsolevel {
   public:
     LocalIsolevel(const common::DistanceGrid& grid, std::span<const Eigen::Vector3d> points)
@@ -193,16 +193,16 @@ void subtract_local_isolevel(std::span<const Eigen::Vector3d> points, unsigned t
     const common::GridFrame& frame = grid.frame;
     common::parallel_for(static_cast<std::size_t>(frame.dims[2]), threads,
                          [&](std::size_t begin, std::size_t end) {
-        for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
-            for (int j = 0; j < frame.dims[1]; ++j) {
-                for (int i = 0; i < frame.dims[0]; ++i) {
-                    float& v = grid.values[frame.index(i, j, k)];
-                    if (std::abs(v) > 4.0 * frame.spacing) continue;
-                    v -= static_cast<float>(level(frame.position(i, j, k)));
-                }
-            }
-        }
-    });
+                             for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
+                                 for (int j = 0; j < frame.dims[1]; ++j) {
+                                     for (int i = 0; i < frame.dims[0]; ++i) {
+                                         float& v = grid.values[frame.index(i, j, k)];
+                                         if (std::abs(v) > 4.0 * frame.spacing) continue;
+                                         v -= static_cast<float>(level(frame.position(i, j, k)));
+                                     }
+                                 }
+                             }
+                         });
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace ellicast::receiver {
@@ -64,8 +65,16 @@ double angle_between(const Vector3d& n1, const Vector3d& n2) {
     return std::atan2(n1.cross(n2).norm(), n1.dot(n2));
 }
 
-// Sum of length x dihedral angle over the edge and the four around it, with the faces (a b c), (b a
-// d) or, flipped, (c d b), (d c a). `outer` are the normals beyond bc, ca, ad, db.
+// Weight of an edge's own length beside length x dihedral angle, in radians: where the surface is
+// flat within about this angle the shorter diagonal wins, as in most meshes that people make.
+constexpr double kLengthWeight = 0.1;
+// A flip must gain this many radians times the mean edge length, or ties would flip back and forth.
+constexpr double kMinGain = 0.02;
+// How much a first flip may cost, in the same unit, when a second one is to make up for it.
+constexpr double kLookAhead = 1.0;
+
+// Cost of the edge and the four around it, with the faces (a b c), (b a d) or, flipped, (c d b), (d
+// c a). `outer` are the normals beyond bc, ca, ad, db.
 struct FlipCost {
     double now;
     double flipped;
@@ -80,10 +89,12 @@ FlipCost flip_cost(const Quad& q, const std::array<Vector3d, 4>& outer) {
     const double ca = (q.c - q.a).norm();
     const double ad = (q.a - q.d).norm();
     const double db = (q.d - q.b).norm();
-    const double now = (q.a - q.b).norm() * angle_between(abc, bad) +
+    const double ab = (q.a - q.b).norm();
+    const double cd = (q.c - q.d).norm();
+    const double now = ab * (kLengthWeight + angle_between(abc, bad)) +
                        bc * angle_between(abc, outer[0]) + ca * angle_between(abc, outer[1]) +
                        ad * angle_between(bad, outer[2]) + db * angle_between(bad, outer[3]);
-    const double flipped = (q.c - q.d).norm() * angle_between(cdb, dca) +
+    const double flipped = cd * (kLengthWeight + angle_between(cdb, dca)) +
                            bc * angle_between(cdb, outer[0]) + ca * angle_between(dca, outer[1]) +
                            ad * angle_between(dca, outer[2]) + db * angle_between(cdb, outer[3]);
     return {now, flipped};
@@ -103,23 +114,105 @@ double mean_edge_length(const SurfaceMesh& mesh) {
     return count == 0 ? 0.0 : sum / static_cast<double>(count);
 }
 
-bool smoothing_flip_pays(const SurfaceMesh& mesh, HalfedgeId h, double min_gain) {
+// What flipping h gains; minus infinity when the flip leaves a needle.
+double smoothing_gain(const SurfaceMesh& mesh, HalfedgeId h) {
     const HalfedgeId t = mesh.twin(h);
     const Quad q = quad_of(mesh, h);
-    const auto outer_normal = [&](HalfedgeId side) {
-        return mesh.area_normal(SurfaceMesh::face_of(mesh.twin(side)));
-    };
-    const std::array<Vector3d, 4> outer = {
-        outer_normal(SurfaceMesh::next(h)), outer_normal(SurfaceMesh::prev(h)),
-        outer_normal(SurfaceMesh::next(t)), outer_normal(SurfaceMesh::prev(t))};
-    const FlipCost cost = flip_cost(q, outer);
-    if (!(cost.now - cost.flipped > min_gain)) return false;
     const double thin_now =
         std::min(triangle_quality(q.a, q.b, q.c), triangle_quality(q.b, q.a, q.d));
     const double thin_new =
         std::min(triangle_quality(q.c, q.d, q.b), triangle_quality(q.d, q.c, q.a));
-    return thin_new >= std::min(kThinnest, thin_now);
+    if (thin_new < std::min(kThinnest, thin_now)) return -std::numeric_limits<double>::infinity();
+    const auto outer_normal = [&](HalfedgeId side) {
+        return mesh.area_normal(SurfaceMesh::face_of(mesh.twin(side)));
+    };
+    const FlipCost cost =
+        flip_cost(q, {outer_normal(SurfaceMesh::next(h)), outer_normal(SurfaceMesh::prev(h)),
+                      outer_normal(SurfaceMesh::next(t)), outer_normal(SurfaceMesh::prev(t))});
+    return cost.now - cost.flipped;
 }
+
+std::array<HalfedgeId, 4> sides_of(const SurfaceMesh& mesh, HalfedgeId h) {
+    const HalfedgeId t = mesh.twin(h);
+    return {SurfaceMesh::next(h), SurfaceMesh::prev(h), SurfaceMesh::next(t), SurfaceMesh::prev(t)};
+}
+
+// Sweeps over the edges in slot order, again over those that a flip made doubtful.
+class Smoother {
+  public:
+    explicit Smoother(SurfaceMesh& mesh)
+        : mesh_(mesh), unit_(mean_edge_length(mesh)), doubtful_(3 * mesh.face_slots()) {}
+
+    template <class Attempt>
+    std::size_t sweep(int passes, const Attempt& attempt) {
+        std::fill(doubtful_.begin(), doubtful_.end(), 1);
+        std::size_t flips = 0;
+        for (int pass = 0; pass < passes; ++pass) {
+            const std::size_t before = flips;
+            for (HalfedgeId h = 0; h < doubtful_.size(); ++h) {
+                if (!doubtful_[h]) continue;
+                doubtful_[h] = 0;
+                if (mesh_.face_alive(SurfaceMesh::face_of(h)) && h < mesh_.twin(h)) {
+                    flips += attempt(h);
+                }
+            }
+            if (flips == before) break;
+        }
+        return flips;
+    }
+
+    std::size_t flip_one(HalfedgeId h) {
+        if (!(smoothing_gain(mesh_, h) > kMinGain * unit_) || !mesh_.can_flip(h)) return 0;
+        mesh_.flip(h);
+        mark(h);
+        return 1;
+    }
+
+    // Flips h and then, where that helps, one of the four edges around it; neither when both
+    // together do not pay. Leads out of the local minima of flip_one: a crease two triangles wide,
+    // say.
+    std::size_t flip_two(HalfedgeId h) {
+        const double first = smoothing_gain(mesh_, h);
+        if (!(first > -kLookAhead * unit_) || !mesh_.can_flip(h)) return 0;
+        mesh_.flip(h);
+        HalfedgeId second = kNone;
+        double gain = kMinGain * unit_ - first;  // that the second flip has to beat
+        const bool alone = gain < 0.0;
+        gain = std::max(gain, 0.0);
+        for (const HalfedgeId side : sides_of(mesh_, h)) {
+            const double here = smoothing_gain(mesh_, side);
+            if (here > gain && mesh_.can_flip(side)) {
+                second = side;
+                gain = here;
+            }
+        }
+        if (second == kNone && !alone) {
+            mesh_.flip(h);  // back
+            return 0;
+        }
+        mark(h);
+        if (second == kNone) return 1;
+        mesh_.flip(second);
+        mark(second);
+        return 2;
+    }
+
+  private:
+    // A flip changes the gain of the edges of its two faces and of their neighbours' edges.
+    void mark(HalfedgeId h) {
+        for (const HalfedgeId side : sides_of(mesh_, h)) {
+            const HalfedgeId beyond = mesh_.twin(side);
+            for (const HalfedgeId x :
+                 {side, SurfaceMesh::next(beyond), SurfaceMesh::prev(beyond)}) {
+                doubtful_[std::min(x, mesh_.twin(x))] = 1;
+            }
+        }
+    }
+
+    SurfaceMesh& mesh_;
+    double unit_;
+    std::vector<char> doubtful_;
+};
 
 }  // namespace
 
@@ -140,11 +233,7 @@ std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue) 
         }
         mesh.flip(h);
         ++flips;
-        const HalfedgeId t = mesh.twin(h);
-        for (const HalfedgeId side : {SurfaceMesh::next(h), SurfaceMesh::prev(h),
-                                      SurfaceMesh::next(t), SurfaceMesh::prev(t)}) {
-            queue.push_back(side);
-        }
+        for (const HalfedgeId side : sides_of(mesh, h)) queue.push_back(side);
     }
     return flips;
 }
@@ -161,34 +250,11 @@ std::size_t flip_all_to_delaunay(SurfaceMesh& mesh) {
     return flip_to_delaunay(mesh, queue);
 }
 
-std::size_t flip_to_smooth(SurfaceMesh& mesh, const SmoothingFlips& options) {
-    const double min_gain = options.min_gain * mean_edge_length(mesh);
-    std::vector<char> doubtful(3 * mesh.face_slots(), 1);
-    std::size_t flips = 0;
-    for (int pass = 0; pass < options.passes; ++pass) {
-        std::size_t here = 0;
-        for (HalfedgeId h = 0; h < 3 * mesh.face_slots(); ++h) {
-            if (!doubtful[h]) continue;
-            doubtful[h] = 0;
-            if (!mesh.face_alive(SurfaceMesh::face_of(h)) || mesh.twin(h) < h) continue;
-            if (!smoothing_flip_pays(mesh, h, min_gain) || !mesh.can_flip(h)) continue;
-            mesh.flip(h);
-            ++here;
-            // The costs of the edges of the two faces and of their neighbours' edges have changed.
-            for (const HalfedgeId e : {h, mesh.twin(h)}) {
-                for (const HalfedgeId side : {SurfaceMesh::next(e), SurfaceMesh::prev(e)}) {
-                    const HalfedgeId beyond = mesh.twin(side);
-                    for (const HalfedgeId x :
-                         {side, beyond, SurfaceMesh::next(beyond), SurfaceMesh::prev(beyond)}) {
-                        doubtful[std::min(x, mesh.twin(x))] = 1;
-                    }
-                }
-            }
-        }
-        flips += here;
-        if (here == 0) break;
-    }
-    return flips;
+std::size_t flip_to_smooth(SurfaceMesh& mesh, int passes) {
+    Smoother smoother(mesh);
+    const std::size_t flips =
+        smoother.sweep(passes, [&](HalfedgeId h) { return smoother.flip_one(h); });
+    return flips + smoother.sweep(passes, [&](HalfedgeId h) { return smoother.flip_two(h); });
 }
 
 }  // namespace ellicast::receiver

@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 
 #include "common/ellipsoid.hpp"
 #include "receiver/coarse_surface.hpp"
 #include "receiver/edge_flips.hpp"
+#include "receiver/ellipsoid_mesh.hpp"
 #include "receiver/shrink_wrap.hpp"
+#include "receiver/surface_distance.hpp"
 #include "receiver/surface_mesh.hpp"
 #include "receiver/vertex_insertion.hpp"
 #include "receiver/vertex_removal.hpp"
@@ -73,6 +76,13 @@ class Pipeline {
 
   private:
     static constexpr int kWrapRounds = 3;
+    // The first chunk, as a multiple of the marching-cubes vertices that it is to replace.
+    static constexpr std::size_t kEnoughVertices = 2;
+    // Under loss, a marching-cubes vertex further than this from every received one stays. 400
+    // ellipsoids wrapped to the received vertices follow a curved surface better than a triangle
+    // over such a gap: 70 % loss, rms with and without, in 1e-4: spot 8 and 40, fertility 10 and
+    // 19, homer 9 and 16; horse 3.6 and 3.3.
+    static constexpr double kReachCells = 2.5;
 
     void stage(const char* name) const {
         if (options_.on_stage) options_.on_stage(name);
@@ -89,12 +99,12 @@ class Pipeline {
         coarse_ = make_coarse_surface(ellipsoids, points_,
                                       Eigen::AlignedBox3d(frame_.to_unit(lo), frame_.to_unit(hi)),
                                       promise, options_.grid, options_.threads);
+        if (coarse_ && options_.keep_stages) {
+            stages_.ellipsoids = to_model_frame(mesh_of(ellipsoids));
+            stages_.marching_cubes = to_model_frame(coarse_->mesh);
+            stages_.halfway = stages_.marching_cubes;
+        }
         return coarse_.has_value();
-    }
-
-    [[nodiscard]] double loss() const {
-        return 1.0 - static_cast<double>(object_.vertices.size()) /
-                         static_cast<double>(std::max<std::uint32_t>(1, object_.hint.vertices));
     }
 
     void insert() {
@@ -103,48 +113,118 @@ class Pipeline {
         assert(mesh);
         surface_.mesh = std::move(*mesh);
         surface_.point_of_vertex.assign(surface_.mesh.vertex_slots(), kNone);
-        std::vector<std::uint32_t> all(points_.size());
-        for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-        left_out_ = insert_points(surface_, points_, all, options_.threads);
+        // Indices are a spatially spread order, so that a prefix is an even sample.
+        const std::size_t enough = kEnoughVertices * surface_.mesh.vertex_slots();
+        const std::size_t first = std::min(points_.size(), enough);
+        std::vector<std::uint32_t> order(points_.size());
+        std::iota(order.begin(), order.end(), 0U);
+        left_out_ =
+            insert_points(surface_, points_, std::span(order).first(first), options_.threads);
+        if (options_.keep_stages) stages_.halfway = to_model_frame(surface_.mesh.extract());
+        const bool whole = points_.size() == object_.hint.vertices;
+        const bool all_in = first == points_.size() && left_out_.empty();
+        settle(whole && all_in);
+        if (all_in) return;
+        std::vector<std::uint32_t> rest(order.begin() + static_cast<std::ptrdiff_t>(first),
+                                        order.end());
+        rest.insert(rest.end(), left_out_.begin(), left_out_.end());
+        stage("insert");
+        left_out_ = insert_points(surface_, points_, rest, options_.threads);
+        settle(whole);
+    }
+
+    // Removes marching-cubes vertices, puts the received ones where they belong, mends the
+    // triangulation. Where every vertex arrived, `whole`, no marching-cubes vertex has a place in
+    // the result.
+    void settle(bool whole) {
         stage("remove");
-        remove_vertices(surface_.mesh,
-                        [&](VertexId v) { return surface_.point_of_vertex[v] == kNone; });
+        const std::vector<bool> needed =
+            whole ? std::vector<bool>(surface_.mesh.vertex_slots(), false)
+                  : needed_coarse_vertices();
+        remove_vertices(surface_.mesh, [&](VertexId v) {
+            return surface_.point_of_vertex[v] == kNone && !needed[v];
+        });
         stage("shift");
         shift_to_points(surface_, points_);
         stage("flip");
-        flip_to_smooth(surface_.mesh, {.min_gain = 0.3 * std::max(0.0, 1.0 - 2.0 * loss())});
+        flip_all_to_delaunay(surface_.mesh);
+        flip_to_smooth(surface_.mesh);
     }
 
+    // Marching-cubes vertices with no received vertex within reach along the surface: there they
+    // are all that tells the shape, and they tell it better than triangles across the gap would.
+    [[nodiscard]] std::vector<bool> needed_coarse_vertices() const {
+        std::vector<VertexId> received;
+        for (VertexId v = 0; v < surface_.mesh.vertex_slots(); ++v) {
+            if (surface_.mesh.vertex_alive(v) && surface_.point_of_vertex[v] != kNone) {
+                received.push_back(v);
+            }
+        }
+        const double reach = kReachCells * coarse_->cell;
+        const std::vector<double> distance = distance_along_edges(surface_.mesh, received, reach);
+        std::vector<bool> needed(distance.size());
+        for (VertexId v = 0; v < needed.size(); ++v) needed[v] = distance[v] > reach;
+        return needed;
+    }
+
+    // The point that result vertex i stands for; kNone for marching-cubes vertices.
+    struct Extracted {
+        common::TriangleMesh mesh;  // unit frame
+        std::vector<std::uint32_t> point;
+    };
+    Extracted extract() {
+        Extracted result;
+        if (points_.empty()) {
+            result.mesh = std::move(coarse_->mesh);
+            result.point.assign(result.mesh.positions.size(), kNone);
+            return result;
+        }
+        std::vector<VertexId> slots;
+        result.mesh = surface_.mesh.extract(&slots);
+        for (const VertexId v : slots) result.point.push_back(surface_.point_of_vertex[v]);
+        return result;
+    }
+
+    // Received vertices get their record's bits, not what the way to the unit frame and back left
+    // of them.
     Reconstruction finish() {
         stage("finish");
         Reconstruction result;
-        std::vector<VertexId> slots;
-        if (points_.empty()) {
-            result.mesh = std::move(coarse_->mesh);
-            result.vertex_index.assign(result.mesh.positions.size(), kNotReceived);
-        } else {
-            result.mesh = surface_.mesh.extract(&slots);
-            for (const VertexId v : slots) {
-                const std::uint32_t point = surface_.point_of_vertex[v];
-                result.vertex_index.push_back(point == kNone ? kNotReceived
-                                                             : object_.vertex_index[point]);
+        const Extracted extracted = extract();
+        result.mesh = to_model_frame(extracted.mesh);
+        for (std::size_t i = 0; i < extracted.point.size(); ++i) {
+            const std::uint32_t point = extracted.point[i];
+            result.vertex_index.push_back(point == kNone ? kNotReceived
+                                                         : object_.vertex_index[point]);
+            if (point != kNone) {
+                result.mesh.positions[i] = origin() + position_of(object_.vertices[point]);
             }
-        }
-        Vector3d origin = Vector3d::Zero();
-        if (object_.description)
-            origin = Eigen::Map<const Vector3d>(object_.description->origin.data());
-        for (std::size_t i = 0; i < result.mesh.positions.size(); ++i) {
-            const std::uint32_t point = slots.empty() ? kNone : surface_.point_of_vertex[slots[i]];
-            Vector3d& p = result.mesh.positions[i];
-            p = origin +
-                (point == kNone ? frame_.from_unit(p) : position_of(object_.vertices[point]));
         }
         for (const std::uint32_t point : left_out_) {
             result.not_inserted.push_back(object_.vertex_index[point]);
         }
         result.topology = common::analyse_topology(result.mesh);
-        result.isolevel = static_cast<float>(coarse_->isolevel);
+        result.topology_as_promised = as_promised(result.topology);
+        result.judged = !object_.hint.approximate;
+        result.isolevel = static_cast<float>(coarse_->isolevel * frame_.diagonal);
+        if (options_.keep_stages) result.stages = std::move(stages_);
         return result;
+    }
+
+    [[nodiscard]] bool as_promised(const common::MeshTopology& topology) const {
+        const protocol::Hint& hint = object_.hint;
+        return topology.closed && topology.manifold && topology.components == hint.components &&
+               topology.euler == hint.euler_all && topology.euler_largest == hint.euler_largest;
+    }
+
+    [[nodiscard]] Vector3d origin() const {
+        if (!object_.description) return Vector3d::Zero();
+        return Eigen::Map<const Vector3d>(object_.description->origin.data());
+    }
+
+    [[nodiscard]] common::TriangleMesh to_model_frame(common::TriangleMesh mesh) const {
+        for (Vector3d& p : mesh.positions) p = origin() + frame_.from_unit(p);
+        return mesh;
     }
 
     const ReceivedObject& object_;
@@ -154,6 +234,7 @@ class Pipeline {
     std::optional<CoarseSurface> coarse_;
     PointSurface surface_;
     std::vector<std::uint32_t> left_out_;
+    Stages stages_;
 };
 
 }  // namespace

@@ -19,7 +19,7 @@ struct ReconstructionOptions {
     unsigned threads = 0;  // does not change the result
     bool keep_stages = false;
     /// Called with the name of the stage that begins; for progress and timing. May be empty.
-    std::function<void(const char* stage)> on_stage;
+    std::function<void(const char* stage)> on_stage = {};
 };
 
 /// Figure 7 of [BK02], as meshes in the object's frame plus origin.
@@ -37,7 +37,7 @@ struct Reconstruction {
     bool topology_as_promised =
         false;           // components, Euler characteristic in all and of the largest
     bool judged = true;  // false when the sender promised only approximately
-    float isolevel = 0;
+    float isolevel = 0;  // model units; with vertices, what was added to the local one
     std::optional<Stages> stages;
 };
 

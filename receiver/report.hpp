@@ -6,18 +6,15 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/mesh_distance.hpp"
 #include "receiver/received_object.hpp"
 #include "receiver/reconstruction.hpp"
 #include "receiver/session.hpp"
+#include "receiver/stage_clock.hpp"
 
 namespace ellicast::receiver {
-
-/// Wall-clock seconds of named stages, in order of first appearance.
-using StageSeconds = std::vector<std::pair<std::string, double>>;
 
 /// All that a run of the receiver has to tell. Pointers may be null: nothing received, nothing
 /// rebuilt, nothing compared.
@@ -29,34 +26,34 @@ struct ReportContent {
     const common::MeshDistance* quality = nullptr;
     bool id_verified = false;
     std::string output;  // path of the mesh, "" when none was written
-    StageSeconds seconds;
+    std::vector<StageTime> times;
 };
 
+// clang-format off
 /// The report, whose keys are:
-///   ends_by          complete, stream_end, round, idle, waited, interrupted (EndReason)
-///   output           path of the mesh or null
-///   object           {id, name, unit, complete, id_verified} or null when nothing was received;
-///                    complete: every record is there; id_verified: and they are those of the id
-///   hint             {box_min, box_max, components, euler_all, euler_largest, approximate}
-///   datagrams        {received, lost, duplicate, reordered, malformed, kernel_dropped, bytes} and
-///                    lost_in_network (lost but not kernel_dropped), jitter_ms, malformed_by
-///                    {cause: count}; received, lost, duplicate, reordered, bytes: of the object's
-///                    streams, and received - duplicate + lost = sent while listening; malformed,
-///                    kernel_dropped: of all
-///   ellipsoids       {received, expected}
-///   vertices         {received, expected, in_mesh}
-///   records          {repeated, conflicting, refused}: came again; indices with contradictory
-///   content;
-///                    beyond the memory limit
-///   others           {groups, datagrams, contradictory_hints, evicted, over_limit}: strangers'
-///   traffic mesh             {vertices, faces, components, genus, closed, manifold,
-///   topology_as_promised, judged,
-///                    isolevel} or null; judged false: the sender promised only approximately
-///   not_inserted     indices of received vertices that are no vertex of the mesh
-///   quality          {rms, mean, max, rms_to_reference, rms_from_reference, normal_deg}, shares of
-///   the
-///                    reference's diagonal and degrees; only with a reference and a mesh
-///   seconds          {stage: wall-clock seconds}
+///   program, version
+///   ends_by       complete, stream_end, round, idle, waited or interrupted (EndReason)
+///   output        path of the mesh, or null
+///   object        {id, name, unit, complete, id_verified}, or null when nothing was received
+///                 complete: every record is there; id_verified: and they are those of the id
+///   hint          {box_min, box_max, components, euler_all, euler_largest, approximate}, or null
+///   datagrams     {received, lost, duplicate, reordered, bytes}: of the object's streams;
+///                   received - duplicate + lost = sent while we listened
+///                 {malformed, kernel_dropped}: of all that came
+///                 {lost_in_network}: lost, less what the kernel dropped
+///                 {jitter_ms}: RFC 3550;  {malformed_by}: {cause: count}, by WireError
+///   ellipsoids    {received, expected}
+///   vertices      {received, expected, in_mesh}
+///   records       {repeated, conflicting, refused}: records that came again; indices with
+///                   contradictory content; records beyond the memory limit
+///   others        {groups, datagrams, contradictory_hints, evicted, over_limit}: strangers
+///   mesh          {vertices, faces, components, genus, closed, manifold, topology_as_promised,
+///                   judged, isolevel}, or null; judged is false for an approximate promise
+///   not_inserted  indices of received vertices that are no vertex of the mesh
+///   quality       {rms, mean, max, rms_to_reference, rms_from_reference, normal_deg}: shares of
+///                   the reference's diagonal, degrees; only with a reference and a mesh
+///   seconds       {stage: {wall, cpu}}
+// clang-format on
 nlohmann::ordered_json make_report(const ReportContent& content);
 
 /// Atomic. Throws common::ModelError with the path and the reason.

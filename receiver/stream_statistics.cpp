@@ -25,6 +25,11 @@ std::optional<std::int64_t> steps_forward(std::uint32_t a, std::uint32_t i, std:
     return std::int64_t{n} - std::int64_t{i} + between * std::int64_t{m} + std::int64_t{j};
 }
 
+// Places in a ring of 64-bit words, of negative numbers too.
+std::uint64_t bit_of(std::int64_t sequence) {
+    return std::uint64_t{1} << (static_cast<std::uint64_t>(sequence) % 64);
+}
+
 double to_seconds(Time time) {
     return std::chrono::duration<double>(time).count();
 }
@@ -42,7 +47,7 @@ StreamCounts& StreamCounts::operator+=(const StreamCounts& other) {
 }
 
 StreamStatistics::StreamStatistics(Time listening_since)
-    : listening_since_(listening_since), seen_(static_cast<std::size_t>(kWindow), false) {}
+    : listening_since_(listening_since), seen_(kWindow / 64, 0) {}
 
 void StreamStatistics::on_datagram(Time now, const protocol::DatagramHeader& header,
                                    std::size_t bytes) {
@@ -73,6 +78,10 @@ void StreamStatistics::on_datagram(Time now, const protocol::DatagramHeader& hea
     }
 }
 
+std::size_t StreamStatistics::word_of(std::int64_t sequence) {
+    return static_cast<std::uint64_t>(sequence) / 64 % (kWindow / 64);
+}
+
 void StreamStatistics::start(Time now, const Place& place) {
     first_seen_ = newest_seen_ = now;
     oldest_ = newest_ = place;
@@ -99,17 +108,21 @@ std::int64_t StreamStatistics::extend(const protocol::DatagramHeader& header) co
 
 // False when the sequence number was seen before, or is too old to tell.
 bool StreamStatistics::mark(std::int64_t sequence) {
-    const auto slot = [](std::int64_t s) {
-        return static_cast<std::size_t>(((s % kWindow) + kWindow) % kWindow);
-    };
-    if (sequence - newest_.sequence >= kWindow) {
-        std::fill(seen_.begin(), seen_.end(), false);
+    const std::int64_t newest = newest_.sequence;
+    if (newest - sequence >= kWindow) return false;
+    if (sequence - newest >= kWindow) {
+        seen_.assign(seen_.size(), 0);
     } else {
-        for (std::int64_t s = newest_.sequence + 1; s < sequence; ++s) seen_[slot(s)] = false;
-        if (sequence > newest_.sequence) seen_[slot(sequence)] = false;
+        // Forget what is kWindow behind; whole words at once, so that lies about gaps cost little.
+        for (std::int64_t s = newest + 1; s <= sequence;) {
+            const bool whole = s % 64 == 0 && s + 64 <= sequence + 1;
+            seen_[word_of(s)] &= whole ? 0 : ~bit_of(s);
+            s += whole ? 64 : 1;
+        }
     }
-    if (newest_.sequence - sequence >= kWindow || seen_[slot(sequence)]) return false;
-    seen_[slot(sequence)] = true;
+    std::uint64_t& word = seen_[word_of(sequence)];
+    if ((word & bit_of(sequence)) != 0) return false;
+    word |= bit_of(sequence);
     return true;
 }
 

@@ -197,7 +197,8 @@ TEST_CASE("polygons become fans of good shape, degenerate corners vanish") {
     for (int i = 0; i < 2000; ++i) {
         disc += std::to_string(std::cos(i * 0.00314159)) + " " +
                 std::to_string(std::sin(i * 0.00314159)) + " 0\n";
-        corners += " " + std::to_string(i);
+        corners += ' ';
+        corners += std::to_string(i);
     }
     CHECK(parse_model(disc + corners + "\n", ".off").triangles.size() == 1998);
 }
@@ -361,8 +362,8 @@ TEST_CASE("counts are believed only as far as the bytes go") {
 }
 
 TEST_CASE("numbers that are none, not finite or out of range are refused") {
-    for (const std::string bad :
-         {"nan", "inf", "-INF", "1e39", "-1e400", "1..2", "0x10", "", "1e", "--1", "+", "1,5"}) {
+    for (const std::string bad : {"nan", "inf", "-INF", "1e39", "-1e400", "1..2", "0x10", "", "1e",
+                                  "--1", "+", "+-1", "-+1", "1,5"}) {
         INFO(bad);
         CHECK(!refusal("v 0 0 " + bad + "\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ".obj").empty());
         CHECK(!refusal("OFF\n3 1 0\n0 0 " + bad + "\n1 0 0\n0 1 0\n3 0 1 2\n", ".off").empty());
@@ -477,10 +478,10 @@ TEST_CASE("random damage never harms the reader") {
                 default:
                     bytes.insert(at, bytes.substr(random.below(bytes.size()), random.below(20)));
             }
-            if (bytes.empty()) bytes = "\n";
+            if (bytes.empty()) bytes.assign(1, '\n');
         }
         const std::string reason = refusal(bytes, extension);
-        CHECK_THAT(reason, !Catch::Contains("otherwise"));  // two readers, one opinion
+        CHECK_THAT(reason, !Catch::Contains("reads it otherwise"));  // two readers, one opinion
         if (reason.empty()) ++read;
     }
     CHECK(read > 100);
