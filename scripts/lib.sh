@@ -9,6 +9,9 @@ case ${1-} in
     -h | --help) usage; exit 0 ;;
 esac
 
+# Lets clones in different places share what ccache holds.
+export CCACHE_BASEDIR="${CCACHE_BASEDIR:-$root}"
+
 # configure PRESET [ARGS...]: quiet unless it fails; with ccache where that is installed.
 configure() {
     preset=$1
