@@ -1,6 +1,7 @@
 // tests/common/model_io_test.cpp
 #include "common/model_io.hpp"
 
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -536,6 +538,30 @@ TEST_CASE("a failed write leaves the old file and nothing else") {
     CHECK_THROWS_WITH(write_ply(folder / "no" / "such.ply", mesh), Catch::Contains("such.ply: "));
     CHECK_THROWS_WITH(write_ply(folder / "", mesh), Catch::Contains("directory"));
     if (fs::exists("/dev/full")) CHECK_THROWS_AS(write_ply("/dev/full", mesh), ModelError);
+    CHECK(folder.entries() == 1);
+}
+
+TEST_CASE("a disk that fills up while writing leaves the old file and no temporary") {
+    const Folder folder;
+    write_ply(folder / "kept.ply", tests::cube());
+    const std::string before = get(folder / "kept.ply");
+    // A limit on the size of files stands in for the disk.
+    struct rlimit old {};
+    REQUIRE(::getrlimit(RLIMIT_FSIZE, &old) == 0);
+    struct rlimit low = old;
+    low.rlim_cur = 4096;
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    REQUIRE(::setrlimit(RLIMIT_FSIZE, &low) == 0);
+    std::string said;
+    try {
+        write_ply(folder / "kept.ply", tests::icosphere(4));
+    } catch (const ModelError& error) {
+        said = error.what();
+    }
+    ::setrlimit(RLIMIT_FSIZE, &old);
+    std::signal(SIGXFSZ, handler);
+    CHECK_THAT(said, Catch::Contains("kept.ply: cannot be written: "));
+    CHECK(get(folder / "kept.ply") == before);
     CHECK(folder.entries() == 1);
 }
 
