@@ -310,7 +310,7 @@ Image draw_surface(const common::TriangleMesh& mesh, const Camera& camera, int w
                 const float line = std::clamp(1.3F - fragment.edge, 0.0F, 1.0F);
                 colour += 0.75F * line * (ink - colour);
             }
-            image.at(x, y) << colour.cwiseMin(1.0F), 1.0F;
+            image.at(x, y) = Vector4f(colour.x(), colour.y(), colour.z(), 1.0F).cwiseMin(1.0F);
         }
     }
     return image;
