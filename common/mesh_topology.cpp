@@ -4,7 +4,12 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <mutex>
 #include <numeric>
+
+#include "common/parallel.hpp"
+#include "common/triangle_intersection.hpp"
+#include "common/triangle_tree.hpp"
 
 namespace ellicast::common {
 namespace {
@@ -169,6 +174,22 @@ std::int64_t euler_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& hal
     return euler + std::count(used.begin(), used.end(), std::uint8_t{1});
 }
 
+TriangleCorners corners_of(const TriangleMesh& mesh, const Triangle& t) {
+    return {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
+}
+
+Eigen::AlignedBox3d box_of(const TriangleCorners& corners) {
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& p : corners) box.extend(p);
+    return box;
+}
+
+bool share_vertex(const Triangle& s, const Triangle& t) {
+    return std::any_of(s.begin(), s.end(), [&](std::uint32_t v) {
+        return std::find(t.begin(), t.end(), v) != t.end();
+    });
+}
+
 }  // namespace
 
 MeshTopology analyse_topology(const TriangleMesh& mesh) {
@@ -213,6 +234,36 @@ Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh) {
         for (const std::uint32_t corner : t) box.extend(mesh.positions[corner]);
     }
     return box;
+}
+
+SelfIntersections count_self_intersections(const TriangleMesh& mesh, unsigned threads) {
+    const TriangleTree tree(mesh);
+    SelfIntersections result;
+    std::vector<std::uint8_t> marked(mesh.triangles.size(), 0);
+    std::mutex merging;
+    parallel_for(mesh.triangles.size(), threads, [&](std::size_t begin, std::size_t end) {
+        std::size_t pairs = 0;
+        std::vector<std::uint8_t> own_marks(mesh.triangles.size(), 0);
+        std::vector<std::uint32_t> candidates;
+        for (std::size_t f = begin; f < end; ++f) {
+            const Triangle& t = mesh.triangles[f];
+            const TriangleCorners corners = corners_of(mesh, t);
+            tree.find_meeting(box_of(corners), candidates);
+            for (const std::uint32_t other : candidates) {
+                if (other <= f || share_vertex(t, mesh.triangles[other])) continue;
+                if (!triangles_meet(corners, corners_of(mesh, mesh.triangles[other]))) continue;
+                ++pairs;
+                own_marks[f] = own_marks[other] = 1;
+            }
+        }
+        // Sums and unions: the order of the threads does not show.
+        const std::lock_guard lock(merging);
+        result.pairs += pairs;
+        for (std::size_t f = 0; f < marked.size(); ++f) marked[f] |= own_marks[f];
+    });
+    result.faces =
+        static_cast<std::size_t>(std::count(marked.begin(), marked.end(), std::uint8_t{1}));
+    return result;
 }
 
 double signed_volume(const TriangleMesh& mesh) {

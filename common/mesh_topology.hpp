@@ -46,8 +46,10 @@ Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh);
 /// closed.
 double signed_volume(const TriangleMesh& mesh);
 
-/// Number of unordered pairs of triangles that share no vertex and intersect (or touch), and the
-/// number of triangles in such pairs. Exact up to double rounding. About n log n by a tree.
+/// Number of unordered pairs of triangles that share no vertex (by index) and intersect or touch,
+/// and the number of triangles in such pairs. Overlaps in one plane count. Exact
+/// (triangles_meet()), degenerate triangles included. About n log n by a tree. Threads do not
+/// change the result.
 struct SelfIntersections {
     std::size_t pairs = 0;
     std::size_t faces = 0;

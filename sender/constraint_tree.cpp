@@ -1,12 +1,13 @@
 // sender/constraint_tree.cpp
 #include "sender/constraint_tree.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 namespace ellicast::sender {
@@ -42,6 +43,16 @@ double rounding_slack(const QuadraticForm& F, double extent) {
     return kUnits * ((quadratic * extent + linear) * extent + std::abs(F.c));
 }
 
+using Mask = std::uint32_t;
+
+// Bit i says whether value i is at most `limit`; no branches.
+template <std::size_t N>
+inline Mask at_most(const std::array<double, N>& values, double limit) {
+    Mask mask = 0;
+    for (std::size_t i = 0; i < N; ++i) mask |= static_cast<Mask>(values[i] <= limit) << i;
+    return mask;
+}
+
 // How many of n leaves go to the left: half of them, rounded to whole subtrees of eight's powers,
 // so that every eight consecutive leaves, and every eight groups of those, are a compact part of
 // space.
@@ -52,106 +63,124 @@ std::size_t left_leaves(std::size_t n, std::size_t children) {
     return units / 2 * unit;
 }
 
-}  // namespace
+// A point with its index, moved together while sorting.
+struct Slot {
+    Vector3d position;
+    std::uint32_t index = 0;
+};
 
-QuadraticForm::QuadraticForm(const Eigen::Matrix4d& Q)
-    : xx(Q(0, 0)),
-      yy(Q(1, 1)),
-      zz(Q(2, 2)),
-      xy(Q(0, 1) + Q(1, 0)),
-      xz(Q(0, 2) + Q(2, 0)),
-      yz(Q(1, 2) + Q(2, 1)),
-      x(Q(0, 3) + Q(3, 0)),
-      y(Q(1, 3) + Q(3, 1)),
-      z(Q(2, 3) + Q(3, 2)),
-      c(Q(3, 3)) {}
-
-std::optional<double> contact_parameter(const QuadraticForm& F0, const QuadraticForm& F1,
-                                        const Vector3d& x) {
-    const double f1 = F1(x);
-    if (!(f1 < 0.0)) return std::nullopt;
-    return std::max(0.0, -F0(x) / f1);  // [BK02] eq. (2)
+// Sorts slots[begin, end), leaves [begin / size, ...), by splits across the longest side of their
+// box.
+void split(std::span<Slot> slots, std::size_t leaf_points, std::size_t children) {
+    const std::size_t leaves = (slots.size() + leaf_points - 1) / leaf_points;
+    if (leaves <= 1) return;
+    AlignedBox3d box;
+    for (const Slot& slot : slots) box.extend(slot.position);
+    Eigen::Index axis = 0;
+    box.sizes().maxCoeff(&axis);
+    const std::size_t middle = left_leaves(leaves, children) * leaf_points;
+    std::nth_element(slots.begin(), slots.begin() + static_cast<std::ptrdiff_t>(middle),
+                     slots.end(), [axis](const Slot& a, const Slot& b) {
+                         const double pa = a.position[axis], pb = b.position[axis];
+                         return pa != pb ? pa < pb : a.index < b.index;
+                     });
+    split(slots.first(middle), leaf_points, children);
+    split(slots.subspan(middle), leaf_points, children);
 }
+
+// Centre and half-axes (columns) of a box that holds the points, along their principal axes.
+struct TurnedBox {
+    Vector3d center;
+    Eigen::Matrix3d half_axes;
+};
+
+TurnedBox enclose(const std::vector<Vector3d>& points, std::span<const std::uint32_t> which) {
+    Vector3d mean = Vector3d::Zero();
+    for (const std::uint32_t i : which) mean += points[i];
+    mean /= static_cast<double>(which.size());
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    for (const std::uint32_t i : which) {
+        const Vector3d d = points[i] - mean;
+        covariance += d * d.transpose();
+    }
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+    eigen.computeDirect(covariance);
+    // The closed-form solver's vectors are orthogonal to some 1e-8 only; the box must hold to
+    // rounding.
+    Eigen::Matrix3d axes;
+    axes.col(0) = eigen.eigenvectors().col(2).normalized();
+    axes.col(1) = axes.col(0).cross(eigen.eigenvectors().col(0)).normalized();
+    axes.col(2) = axes.col(0).cross(axes.col(1));
+    AlignedBox3d box;  // in the turned frame, about the mean
+    for (const std::uint32_t i : which) box.extend(Vector3d(axes.transpose() * (points[i] - mean)));
+    return {mean + axes * box.center(), axes * (0.5 * box.sizes()).asDiagonal()};
+}
+
+}  // namespace
 
 ConstraintTree::ConstraintTree(std::vector<Vector3d> points) : points_(std::move(points)) {
     assert(points_.size() < std::numeric_limits<std::uint32_t>::max());
-    if (points_.empty()) return;
+    sort_into_leaves();
+    fill_leaves();
+    build_nodes();
+}
+
+ConstraintTree::ConstraintTree(std::vector<Vector3d> points, const ConstraintTree& like)
+    : points_(std::move(points)), order_(like.order_) {
+    assert(points_.size() == like.points_.size());
+    fill_leaves();
+    build_nodes();
+}
+
+void ConstraintTree::sort_into_leaves() {
+    std::vector<Slot> slots(points_.size());
+    for (std::uint32_t i = 0; i < slots.size(); ++i) slots[i] = {points_[i], i};
+    split(slots, kLeafPoints, kChildren);
+    order_.reserve(slots.size());
+    for (const Slot& slot : slots) order_.push_back(slot.index);
+}
+
+void ConstraintTree::fill_leaves() {
     for (const Vector3d& p : points_) {
         assert(p.allFinite());
         extent_ = std::max(extent_, p.cwiseAbs().maxCoeff());
     }
-    std::vector<std::uint32_t> order(points_.size());
-    std::iota(order.begin(), order.end(), 0u);
-    build_leaves(order);
-    build_nodes();
-}
-
-void ConstraintTree::build_leaves(std::vector<std::uint32_t>& order) {
-    const std::size_t leaf_count = (order.size() + kLeafPoints - 1) / kLeafPoints;
-    // Splits the range of leaves [first, last) across the longest side of its points' box.
-    const auto split = [&](const auto& self, std::size_t first, std::size_t last) -> void {
-        const std::size_t begin = first * kLeafPoints;
-        const std::size_t end = std::min(last * kLeafPoints, order.size());
-        if (last - first <= 1) return;
-        AlignedBox3d box;
-        for (std::size_t i = begin; i < end; ++i) box.extend(points_[order[i]]);
-        Eigen::Index axis = 0;
-        box.sizes().maxCoeff(&axis);
-        const std::size_t middle = first + left_leaves(last - first, kChildren);
-        std::nth_element(order.begin() + static_cast<std::ptrdiff_t>(begin),
-                         order.begin() + static_cast<std::ptrdiff_t>(middle * kLeafPoints),
-                         order.begin() + static_cast<std::ptrdiff_t>(end),
-                         [&](std::uint32_t a, std::uint32_t b) {
-                             const double pa = points_[a][axis], pb = points_[b][axis];
-                             return pa != pb ? pa < pb : a < b;
-                         });
-        self(self, first, middle);
-        self(self, middle, last);
-    };
-    split(split, 0, leaf_count);
-
-    leaves_.resize(leaf_count);
-    indices_.resize(leaf_count);
-    for (std::size_t leaf = 0; leaf < leaf_count; ++leaf) {
+    leaves_.resize((order_.size() + kLeafPoints - 1) / kLeafPoints);
+    for (std::size_t leaf = 0; leaf < leaves_.size(); ++leaf) {
         for (std::size_t i = 0; i < kLeafPoints; ++i) {
-            const std::size_t at = std::min(leaf * kLeafPoints + i, order.size() - 1);
-            const Vector3d& p = points_[order[at]];
+            const std::size_t slot = std::min(leaf * kLeafPoints + i, order_.size() - 1);
+            const Vector3d& p = points_[order_[slot]];
             leaves_[leaf].x[i] = p[0];
             leaves_[leaf].y[i] = p[1];
             leaves_[leaf].z[i] = p[2];
-            indices_[leaf][i] = order[at];
         }
     }
 }
 
 void ConstraintTree::build_nodes() {
-    std::vector<AlignedBox3d> boxes;
-    boxes.reserve(leaves_.size());
-    for (const auto& indices : indices_) {
-        AlignedBox3d box;
-        for (const std::uint32_t i : indices) box.extend(points_[i]);
-        boxes.push_back(box);
-    }
+    if (leaves_.empty()) return;
+    std::size_t children = leaves_.size();
+    std::size_t points_of_child = kLeafPoints;
     do {
-        std::vector<Node> nodes((boxes.size() + kChildren - 1) / kChildren, Node{});
-        std::vector<AlignedBox3d> parents(nodes.size());
-        for (std::size_t i = 0; i < boxes.size(); ++i) {
+        std::vector<Node> nodes((children + kChildren - 1) / kChildren, Node{});
+        for (std::size_t i = 0; i < children; ++i) {
+            const std::size_t first = i * points_of_child;
+            const std::size_t count = std::min(points_of_child, order_.size() - first);
+            const TurnedBox box = enclose(points_, std::span(order_).subspan(first, count));
             Node& node = nodes[i / kChildren];
             const std::size_t child = i % kChildren;
-            const Vector3d m = boxes[i].center();
-            // Largest distance from the rounded centre, so that the box is never too small.
-            const Vector3d h = (boxes[i].max() - m).cwiseMax(m - boxes[i].min());
-            node.mx[child] = m[0];
-            node.my[child] = m[1];
-            node.mz[child] = m[2];
-            node.hx[child] = h[0];
-            node.hy[child] = h[1];
-            node.hz[child] = h[2];
-            parents[i / kChildren].extend(boxes[i]);
+            node.mx[child] = box.center[0];
+            node.my[child] = box.center[1];
+            node.mz[child] = box.center[2];
+            for (std::size_t k = 0; k < 9; ++k) {
+                // Column-major: the three components of the first axis come first.
+                node.half_axes[k][child] = box.half_axes.data()[k];
+            }
         }
+        children = nodes.size();
+        points_of_child *= kChildren;
         levels_.push_back(std::move(nodes));
-        boxes = std::move(parents);
-    } while (boxes.size() > 1);
+    } while (children > 1);
 }
 
 class ConstraintTree::Query {
@@ -176,27 +205,17 @@ class ConstraintTree::Query {
             level == 0 ? tree_.leaves_.size() : tree_.levels_[level - 1].size();
         const std::size_t first = node_index * kChildren;
         const std::size_t count = std::min(kChildren, below - first);
-        std::array<double, kChildren> bound;
-        lower_bounds(node, bound);
-
-        // Most promising child first: it holds the deepest intrusion into the grown shape.
-        std::array<std::uint8_t, kChildren> queue;
-        std::size_t queued = 0;
-        for (std::size_t i = 0; i < count; ++i) {
-            if (bound[i] > slack_) continue;
-            std::size_t at = queued++;
-            for (; at > 0 && bound[queue[at - 1]] > bound[i]; --at) queue[at] = queue[at - 1];
-            queue[at] = static_cast<std::uint8_t>(i);
-        }
-        const double t_before = best_.t;
-        for (std::size_t k = 0; k < queued; ++k) {
-            const std::size_t child = queue[k];
-            if (best_.t < t_before && lower_bound(node, child) > slack_) continue;
+        Mask open = reaching_boxes(F_, node, slack_) & ((Mask{1} << count) - 1);
+        while (open != 0) {
+            const std::size_t child = first + static_cast<std::size_t>(std::countr_zero(open));
+            open &= open - 1;
+            const double t_before = best_.t;
             if (level == 0) {
-                scan_leaf(first + child);
+                scan_leaf(child);
             } else {
-                visit(level - 1, first + child);
+                visit(level - 1, child);
             }
+            if (best_.t < t_before) open &= reaching_boxes(F_, node, slack_);
         }
     }
 
@@ -211,35 +230,42 @@ class ConstraintTree::Query {
         slack_ = rounding_slack(F_, tree_.extent_);
     }
 
-    // F(m) - sum_i |dF/dx_i(m)| h_i of one child.
-    [[nodiscard]] double lower_bound(const Node& node, std::size_t i) const {
-        const QuadraticForm& F = F_;
+    // F(m) - sum_i |grad F(m)'a_i| of one child.
+    [[nodiscard]] static double box_bound(const QuadraticForm& F, const Node& node, std::size_t i) {
         const double x = node.mx[i], y = node.my[i], z = node.mz[i];
         const double gx = 2.0 * F.xx * x + F.xy * y + F.xz * z + F.x;
         const double gy = F.xy * x + 2.0 * F.yy * y + F.yz * z + F.y;
         const double gz = F.xz * x + F.yz * y + 2.0 * F.zz * z + F.z;
-        // Euler: 2 F = x'grad + (linear part) + 2 c.
+        // Euler: 2 F = m'grad + (linear part) + 2 c.
         const double value = 0.5 * (x * (gx + F.x) + y * (gy + F.y) + z * (gz + F.z)) + F.c;
-        return value - std::abs(gx) * node.hx[i] - std::abs(gy) * node.hy[i] -
-               std::abs(gz) * node.hz[i];
+        const auto& a = node.half_axes;
+        return value - std::abs(gx * a[0][i] + gy * a[1][i] + gz * a[2][i]) -
+               std::abs(gx * a[3][i] + gy * a[4][i] + gz * a[5][i]) -
+               std::abs(gx * a[6][i] + gy * a[7][i] + gz * a[8][i]);
     }
 
-    void lower_bounds(const Node& node, std::array<double, kChildren>& bound) const {
-        for (std::size_t i = 0; i < kChildren; ++i) bound[i] = lower_bound(node, i);
+    // One bit a child: whether its box reaches into F <= slack.
+    static Mask reaching_boxes(const QuadraticForm& F, const Node& node, double slack) {
+        std::array<double, kChildren> bound;
+        for (std::size_t i = 0; i < kChildren; ++i) bound[i] = box_bound(F, node, i);
+        return at_most(bound, slack);
     }
 
-    void scan_leaf(std::size_t index) {
-        const Leaf& leaf = tree_.leaves_[index];
-        const QuadraticForm F = F_;
+    // One bit a point of the leaf: whether F <= slack there.
+    static Mask reaching_points(const QuadraticForm& F, const Leaf& leaf, double slack) {
         std::array<double, kLeafPoints> value;
         for (std::size_t i = 0; i < kLeafPoints; ++i) {
             value[i] = F(leaf.x[i], leaf.y[i], leaf.z[i]);
         }
-        double least = value[0];
-        for (std::size_t i = 1; i < kLeafPoints; ++i) least = std::min(least, value[i]);
-        if (least > slack_) return;
-        for (std::size_t i = 0; i < kLeafPoints; ++i) {
-            if (value[i] <= slack_) offer(tree_.indices_[index][i]);
+        return at_most(value, slack);
+    }
+
+    void scan_leaf(std::size_t index) {
+        Mask inside = reaching_points(F_, tree_.leaves_[index], slack_);
+        for (; inside != 0; inside &= inside - 1) {
+            const std::size_t slot =
+                index * kLeafPoints + static_cast<std::size_t>(std::countr_zero(inside));
+            offer(tree_.order_[std::min(slot, tree_.order_.size() - 1)]);
         }
     }
 

@@ -77,9 +77,10 @@ GrowthInput prepare_growth(const TriangleMesh& unit, const DecompositionOptions&
     GrowthOptions growth;
     growth.epsilon = options.epsilon;
     growth.max_aspect = options.max_aspect;
+    ConstraintTree constraints(sample_positions(samples, smoothed.positions));
+    ConstraintTree surface(sample_positions(samples, unit.positions), constraints);
     return {place_seeds(smoothed, samples, options.candidates, options.seed),
-            ConstraintTree(sample_positions(samples, smoothed.positions)),
-            ConstraintTree(sample_positions(samples, unit.positions)), growth};
+            std::move(constraints), std::move(surface), growth};
 }
 
 // Order of the seeds along a Morton curve, so that a growth's contacts are good guesses for the

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
 namespace ellicast::sender {
 namespace {
@@ -32,6 +33,12 @@ Vector3d inward_normal(const TriangleMesh& mesh, const Triangle& t) {
 
 double edge_length(const TriangleMesh& mesh, std::uint32_t a, std::uint32_t b) {
     return (mesh.positions[a] - mesh.positions[b]).norm();
+}
+
+// Squared length of the side opposite each corner.
+std::array<double, 3> squared_sides(const TriangleMesh& mesh, const Triangle& t) {
+    const Vector3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    return {(b - c).squaredNorm(), (c - a).squaredNorm(), (a - b).squaredNorm()};
 }
 
 int parts_of(double length, double spacing) {
@@ -68,7 +75,9 @@ std::vector<Side> long_sides(const TriangleMesh& mesh, double spacing) {
         const Triangle& t = mesh.triangles[f];
         for (std::size_t i = 0; i < 3; ++i) {
             const auto [low, high] = std::minmax(t[i], t[(i + 1) % 3]);
-            if (edge_length(mesh, low, high) > spacing) sides.push_back({low, high, f});
+            if ((mesh.positions[low] - mesh.positions[high]).squaredNorm() > spacing * spacing) {
+                sides.push_back({low, high, f});
+            }
         }
     }
     std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
@@ -100,16 +109,12 @@ void add_edges(const TriangleMesh& mesh, double spacing, SurfaceSamples& samples
 // Rows parallel to the longest edge ab, between it and the opposite corner c.
 void add_interior(const TriangleMesh& mesh, const Triangle& t, double spacing,
                   SurfaceSamples& samples) {
-    std::size_t longest = 0;
-    for (std::size_t i = 1; i < 3; ++i) {
-        if (edge_length(mesh, t[i], t[(i + 1) % 3]) >
-            edge_length(mesh, t[longest], t[(longest + 1) % 3])) {
-            longest = i;
-        }
-    }
-    const std::uint32_t a = t[longest], b = t[(longest + 1) % 3], c = t[(longest + 2) % 3];
-    const double base = edge_length(mesh, a, b);
-    if (!(base > spacing)) return;
+    const std::array<double, 3> sides = squared_sides(mesh, t);
+    const auto top = static_cast<std::size_t>(
+        std::distance(sides.begin(), std::max_element(sides.begin(), sides.end())));
+    if (!(sides[top] > spacing * spacing)) return;
+    const std::uint32_t a = t[(top + 1) % 3], b = t[(top + 2) % 3], c = t[top];
+    const double base = std::sqrt(sides[top]);
     const double height = area_vector(mesh, t).norm() / base;
     const int rows = parts_of(height, spacing);
     const Vector3d inward = inward_normal(mesh, t);
@@ -129,11 +134,13 @@ void add_interior(const TriangleMesh& mesh, const Triangle& t, double spacing,
 std::vector<Vector3d> inward_vertex_normals(const TriangleMesh& mesh) {
     std::vector<Vector3d> sums(mesh.positions.size(), Vector3d::Zero());
     for (const Triangle& t : mesh.triangles) {
-        const Vector3d inward = inward_normal(mesh, t);
+        // [M99]: the area vector over the squared lengths of the corner's two sides, that is
+        // sin(angle) / (|u| |v|) times the normal. Exact on spheres, and no angle is computed.
+        const Vector3d inward = -area_vector(mesh, t);
+        const std::array<double, 3> opposite = squared_sides(mesh, t);
         for (std::size_t i = 0; i < 3; ++i) {
-            const Vector3d u = mesh.positions[t[(i + 1) % 3]] - mesh.positions[t[i]];
-            const Vector3d v = mesh.positions[t[(i + 2) % 3]] - mesh.positions[t[i]];
-            sums[t[i]] += std::atan2(u.cross(v).norm(), u.dot(v)) * inward;
+            const double weight = opposite[(i + 1) % 3] * opposite[(i + 2) % 3];
+            if (weight > 0.0) sums[t[i]] += inward / weight;
         }
     }
     for (Vector3d& sum : sums) sum = unit_or_zero(sum);
@@ -157,12 +164,9 @@ double default_sample_spacing(const TriangleMesh& mesh) {
     double large = 0.0, all = 0.0;
     for (const Triangle& t : mesh.triangles) {
         const double area = area_vector(mesh, t).norm();
-        double longest = 0.0;
-        for (std::size_t i = 0; i < 3; ++i) {
-            longest = std::max(longest, edge_length(mesh, t[i], t[(i + 1) % 3]));
-        }
+        const std::array<double, 3> sides = squared_sides(mesh, t);
         all += area;
-        if (longest > kLongEdge) large += area;
+        if (*std::max_element(sides.begin(), sides.end()) > kLongEdge * kLongEdge) large += area;
     }
     return large > 0.2 * all ? 0.01 : 0.02;
 }

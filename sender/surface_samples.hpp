@@ -35,8 +35,9 @@ struct SurfaceSamples {
 /// [BK02] tests vertices alone, which fails on coarse and CAD-like meshes (DESIGN section 3). An
 /// edge of length l gets ceil(l / spacing) - 1 points, each point once however many triangles share
 /// the edge; a triangle gets rows parallel to its longest edge, so that slivers cost no more than
-/// their area. Normals: vertices angle-weighted, edges the mean of their triangles, triangles their
-/// own. Requires spacing > 0 (asserted), a closed outward mesh for "inward" to mean what it says.
+/// their area. Normals: vertices weighted as [M99] does, edges the mean of their triangles,
+/// triangles their own. Requires spacing > 0 (asserted), a closed outward mesh for "inward" to mean
+/// what it says.
 SurfaceSamples sample_surface(const common::TriangleMesh& mesh, double spacing);
 
 /// Spacing that suits a mesh of bounding-box diagonal 1: 0.01 when much of the area lies in large,
@@ -49,7 +50,8 @@ double default_sample_spacing(const common::TriangleMesh& mesh);
 SurfaceSamples random_surface_points(const common::TriangleMesh& mesh, std::size_t count,
                                      common::Random& random);
 
-/// Inward unit normals of all vertices, angle-weighted; zero where undefined.
+/// Inward unit normals of all vertices, weighted as [M99] does (N. Max, Weights for computing
+/// vertex normals from facet normals, 1999); zero where undefined.
 std::vector<Eigen::Vector3d> inward_vertex_normals(const common::TriangleMesh& mesh);
 
 }  // namespace ellicast::sender
