@@ -30,7 +30,10 @@ template <class Float>
 Float parse_real(std::string_view token, std::size_t line) {
     if (token.empty()) fail_at(line, "a number is missing");
     std::string_view digits = token;
-    if (digits.front() == '+') digits.remove_prefix(1);
+    if (digits.front() == '+') {
+        digits.remove_prefix(1);
+        if (digits.starts_with('-')) digits = {};
+    }
     Float value = 0;
     const char* end = digits.data() + digits.size();
     const auto [stop, error] = std::from_chars(digits.data(), end, value);

@@ -105,32 +105,18 @@ TurnedBox enclose(const std::vector<Vector3d>& points, std::span<const std::uint
     }
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
     eigen.computeDirect(covariance);
-    const Eigen::Matrix3d axes = eigen.eigenvectors();
+    // The closed-form solver's vectors are orthogonal to some 1e-8 only; the box must hold to
+    // rounding.
+    Eigen::Matrix3d axes;
+    axes.col(0) = eigen.eigenvectors().col(2).normalized();
+    axes.col(1) = axes.col(0).cross(eigen.eigenvectors().col(0)).normalized();
+    axes.col(2) = axes.col(0).cross(axes.col(1));
     AlignedBox3d box;  // in the turned frame, about the mean
     for (const std::uint32_t i : which) box.extend(Vector3d(axes.transpose() * (points[i] - mean)));
     return {mean + axes * box.center(), axes * (0.5 * box.sizes()).asDiagonal()};
 }
 
 }  // namespace
-
-QuadraticForm::QuadraticForm(const Eigen::Matrix4d& Q)
-    : xx(Q(0, 0)),
-      yy(Q(1, 1)),
-      zz(Q(2, 2)),
-      xy(Q(0, 1) + Q(1, 0)),
-      xz(Q(0, 2) + Q(2, 0)),
-      yz(Q(1, 2) + Q(2, 1)),
-      x(Q(0, 3) + Q(3, 0)),
-      y(Q(1, 3) + Q(3, 1)),
-      z(Q(2, 3) + Q(3, 2)),
-      c(Q(3, 3)) {}
-
-std::optional<double> contact_parameter(const QuadraticForm& F0, const QuadraticForm& F1,
-                                        const Vector3d& x) {
-    const double f1 = F1(x);
-    if (!(f1 < 0.0)) return std::nullopt;
-    return std::max(0.0, -F0(x) / f1);  // [BK02] eq. (2)
-}
 
 ConstraintTree::ConstraintTree(std::vector<Vector3d> points) : points_(std::move(points)) {
     assert(points_.size() < std::numeric_limits<std::uint32_t>::max());

@@ -5,9 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "common/ellipsoid.hpp"
-#include "sender/constraint_tree.hpp"
+#include "sender/constraint_search.hpp"
 
 namespace ellicast::sender {
 
@@ -54,7 +55,7 @@ struct TouchingSphere {
 /// Stage one, [BK02] section 3.2: the largest sphere that touches the seed from inside and holds no
 /// constraint. Empty when nothing is met up to max_radius (an open or inverted surface), or when
 /// the sphere is too small to be shrunk.
-std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintTree& constraints,
+std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintSearch& constraints,
                                           const GrowthOptions& options,
                                           std::span<const std::uint32_t> guesses);
 
@@ -79,8 +80,9 @@ Eigen::Matrix4d profile_cylinder(const Eigen::Matrix4d& Q, const Eigen::Vector3d
 /// centre until the points of `surface`, those of the unsmoothed mesh, are touched. No point of
 /// `surface` lies inside the result (up to rounding). Empty when a stage fails; see the stages.
 /// `contacts`: in, those of a growth near by or none; out, those of this one.
-std::optional<common::Ellipsoid> grow_ellipsoid(const Seed& seed, const ConstraintTree& constraints,
-                                                const ConstraintTree& surface,
+std::optional<common::Ellipsoid> grow_ellipsoid(const Seed& seed,
+                                                const ConstraintSearch& constraints,
+                                                const ConstraintSearch& surface,
                                                 const GrowthOptions& options,
                                                 GrowthContacts& contacts);
 

@@ -40,7 +40,10 @@ std::vector<std::uint32_t> first_at_position(const TriangleMesh& mesh,
     for (std::size_t v = 0; v < used.size(); ++v) {
         if (!used[v]) continue;
         const Vector3d& p = mesh.positions[v];
-        if (!p.allFinite()) throw std::invalid_argument("a coordinate is not finite");
+        // Cubes of lengths must stay finite too.
+        if (!(p.cwiseAbs().array() < 1e100).all()) {
+            throw std::invalid_argument("a coordinate is not finite or beyond all measure");
+        }
         places.push_back({p.x(), p.y(), p.z(), static_cast<std::uint32_t>(v)});
     }
     std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {

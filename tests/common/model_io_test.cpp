@@ -1,6 +1,7 @@
 // tests/common/model_io_test.cpp
 #include "common/model_io.hpp"
 
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -197,7 +199,8 @@ TEST_CASE("polygons become fans of good shape, degenerate corners vanish") {
     for (int i = 0; i < 2000; ++i) {
         disc += std::to_string(std::cos(i * 0.00314159)) + " " +
                 std::to_string(std::sin(i * 0.00314159)) + " 0\n";
-        corners += " " + std::to_string(i);
+        corners += ' ';
+        corners += std::to_string(i);
     }
     CHECK(parse_model(disc + corners + "\n", ".off").triangles.size() == 1998);
 }
@@ -361,8 +364,8 @@ TEST_CASE("counts are believed only as far as the bytes go") {
 }
 
 TEST_CASE("numbers that are none, not finite or out of range are refused") {
-    for (const std::string bad :
-         {"nan", "inf", "-INF", "1e39", "-1e400", "1..2", "0x10", "", "1e", "--1", "+", "1,5"}) {
+    for (const std::string bad : {"nan", "inf", "-INF", "1e39", "-1e400", "1..2", "0x10", "", "1e",
+                                  "--1", "+", "+-1", "-+1", "1,5"}) {
         INFO(bad);
         CHECK(!refusal("v 0 0 " + bad + "\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", ".obj").empty());
         CHECK(!refusal("OFF\n3 1 0\n0 0 " + bad + "\n1 0 0\n0 1 0\n3 0 1 2\n", ".off").empty());
@@ -477,10 +480,10 @@ TEST_CASE("random damage never harms the reader") {
                 default:
                     bytes.insert(at, bytes.substr(random.below(bytes.size()), random.below(20)));
             }
-            if (bytes.empty()) bytes = "\n";
+            if (bytes.empty()) bytes.assign(1, '\n');
         }
         const std::string reason = refusal(bytes, extension);
-        CHECK_THAT(reason, !Catch::Contains("otherwise"));  // two readers, one opinion
+        CHECK_THAT(reason, !Catch::Contains("reads it otherwise"));  // two readers, one opinion
         if (reason.empty()) ++read;
     }
     CHECK(read > 100);
@@ -535,6 +538,30 @@ TEST_CASE("a failed write leaves the old file and nothing else") {
     CHECK_THROWS_WITH(write_ply(folder / "no" / "such.ply", mesh), Catch::Contains("such.ply: "));
     CHECK_THROWS_WITH(write_ply(folder / "", mesh), Catch::Contains("directory"));
     if (fs::exists("/dev/full")) CHECK_THROWS_AS(write_ply("/dev/full", mesh), ModelError);
+    CHECK(folder.entries() == 1);
+}
+
+TEST_CASE("a disk that fills up while writing leaves the old file and no temporary") {
+    const Folder folder;
+    write_ply(folder / "kept.ply", tests::cube());
+    const std::string before = get(folder / "kept.ply");
+    // A limit on the size of files stands in for the disk.
+    struct rlimit old {};
+    REQUIRE(::getrlimit(RLIMIT_FSIZE, &old) == 0);
+    struct rlimit low = old;
+    low.rlim_cur = 4096;
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    REQUIRE(::setrlimit(RLIMIT_FSIZE, &low) == 0);
+    std::string said;
+    try {
+        write_ply(folder / "kept.ply", tests::icosphere(4));
+    } catch (const ModelError& error) {
+        said = error.what();
+    }
+    ::setrlimit(RLIMIT_FSIZE, &old);
+    std::signal(SIGXFSZ, handler);
+    CHECK_THAT(said, Catch::Contains("kept.ply: cannot be written: "));
+    CHECK(get(folder / "kept.ply") == before);
     CHECK(folder.entries() == 1);
 }
 

@@ -359,8 +359,13 @@ TEST_CASE("what encloses nothing is refused with a reason") {
     mesh.triangles[4][2] = 8;
     CHECK_THROWS_AS(prepare_model(mesh), std::invalid_argument);
     mesh.triangles[4][2] = 0;
-    mesh.positions[0][1] = std::numeric_limits<double>::quiet_NaN();
-    CHECK_THROWS_AS(prepare_model(mesh), std::invalid_argument);
+    for (const double bad : {std::numeric_limits<double>::quiet_NaN(), HUGE_VAL, -1e300}) {
+        mesh.positions[0][1] = bad;
+        CHECK_THROWS_AS(prepare_model(mesh), std::invalid_argument);
+        mesh.positions[3][2] = bad;
+        CHECK_THROWS_AS(prepare_model(mesh), std::invalid_argument);
+        mesh.positions[3][2] = 0;
+    }
 }
 
 TEST_CASE("scale and place change nothing but rounding") {
