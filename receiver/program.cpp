@@ -96,6 +96,9 @@ void warn_of_oddities(const ReportContent& content) {
         spdlog::warn("{} records beyond the memory limit were refused",
                      content.session.store.refused);
     }
+    if (content.object && !content.object->description) {
+        spdlog::warn("no description arrived: name and origin of the model are unknown");
+    }
     if (content.object && is_complete(*content.object) && !content.id_verified) {
         spdlog::warn("the object is complete, but its records are not those of its id");
     }

@@ -23,11 +23,12 @@ struct DecompositionOptions {
     std::size_t candidates = 10'000;  // how many seeds to grow
     Criterion criterion = Criterion::robust;
     double expected_loss = 0.3;  // probability that a selected ellipsoid is lost; robust only
-    int grid = 100;              // selection voxels along the longest axis
+    int grid = 128;              // selection voxels along the longest axis
     int presmooth = -1;          // Laplacian steps; -1: by the mesh's density (0 to 3)
-    double epsilon = 0.00075;    // offset of the touching points, share of the diagonal
-    double sample_spacing = 0;   // of the surface samples, share of the diagonal; 0: by the mesh
-    double max_aspect = 8;       // longest over shortest axis while growing
+    double epsilon = 0.0004;     // offset of the touching points, share of the diagonal
+    double facet_edge = 0.02;  // triangles with a longer edge, share of the diagonal, bound growth
+                               // with their whole face, the others with their corners
+    double max_aspect = 8;     // longest over shortest axis while growing
     std::uint64_t seed = 1;
     unsigned threads = 0;  // does not change the result
 };

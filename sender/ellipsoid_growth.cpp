@@ -75,8 +75,8 @@ StretchedEllipsoid grow_in_wedge(const TouchingSphere& sphere, const ConstraintS
     const std::optional<Contact> contact = constraints.first_contact(F1, F2, alpha, guesses);
     std::optional<Vector3d> shifted;
     if (contact) {
-        contacts.add(contact->point);
-        const Vector3d& r = constraints.points()[contact->point];
+        contacts.add(contact->constraint);
+        const Vector3d& r = contact->point;
         const double epsilon = std::min(options.epsilon, 0.1 * sphere.radius);
         shifted = shifted_inwards(Q1 + contact->t * Q2, r, epsilon);
         // The alpha whose ellipsoid passes through r' instead of r.
@@ -109,7 +109,7 @@ Matrix4d grow_along_cylinder(const StretchedEllipsoid& stretched, const Vector3d
     const std::optional<Contact> contact =
         constraints.first_contact(QuadraticForm(stretched.Q), QuadraticForm(Q3), beta, guesses);
     if (contact) {
-        contacts.add(contact->point);
+        contacts.add(contact->constraint);
         beta = contact->t;
     }
     return stretched.Q + beta * Q3;
@@ -126,7 +126,7 @@ std::optional<Ellipsoid> inflate(Ellipsoid ellipsoid, const ConstraintSearch& su
     const double t_max = largest_scale * largest_scale;
     const std::optional<Contact> contact = surface.first_contact(
         QuadraticForm(Q), linear_form(Vector3d::Zero(), -1.0), t_max, contacts.view());
-    if (contact) contacts.add(contact->point);
+    if (contact) contacts.add(contact->constraint);
     const double scale = std::sqrt(contact ? contact->t : t_max);
     if (!(scale * axes[0] >= options.min_radius)) return std::nullopt;
     ellipsoid.L *= scale;
@@ -149,8 +149,8 @@ std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintSear
     sphere.center = p + r_opt * n;
     sphere.radius = r_opt - std::min(options.epsilon, 0.1 * r_opt);
     if (!(sphere.radius >= options.min_radius)) return std::nullopt;
-    sphere.touched = contact->point;
-    const Vector3d to_q = constraints.points()[contact->point] - sphere.center;
+    sphere.touched = contact->constraint;
+    const Vector3d to_q = contact->point - sphere.center;
     sphere.p = sphere.center - sphere.radius * n;
     sphere.q = sphere.center + sphere.radius * to_q.normalized();
     return sphere;

@@ -28,17 +28,19 @@ struct GrowthOptions {
         1e-5;  // of the result; below, nothing is gained and receivers would refuse it
 };
 
-/// Constraint points met by a growth, in the order of its stages. They are likely to be met by the
+/// Constraints met by a growth, in the order of its stages. They are likely to be met by the
 /// growth from a seed near by, too, and make its search short.
 struct GrowthContacts {
     static constexpr std::size_t kMax = 4;
-    std::array<std::uint32_t, kMax> points{};
+    std::array<std::uint32_t, kMax> constraints{};
     std::size_t count = 0;
 
-    void add(std::uint32_t point) {
-        if (count < kMax) points[count++] = point;
+    void add(std::uint32_t constraint) {
+        if (count < kMax) constraints[count++] = constraint;
     }
-    [[nodiscard]] std::span<const std::uint32_t> view() const { return {points.data(), count}; }
+    [[nodiscard]] std::span<const std::uint32_t> view() const {
+        return {constraints.data(), count};
+    }
 };
 
 /// The sphere of stage one, already shrunk by epsilon about its centre. p and q are the shifted
@@ -49,7 +51,7 @@ struct TouchingSphere {
     double radius = 0;
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     Eigen::Vector3d q = Eigen::Vector3d::Zero();
-    std::uint32_t touched = 0;  // constraint point behind q
+    std::uint32_t touched = 0;  // constraint behind q
 };
 
 /// Stage one, [BK02] section 3.2: the largest sphere that touches the seed from inside and holds no

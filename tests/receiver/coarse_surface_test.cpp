@@ -37,7 +37,7 @@ TEST_CASE("a single ellipsoid gives a closed sphere") {
     REQUIRE(surface);
     REQUIRE(surface->as_promised);
     REQUIRE(common::analyse_topology(surface->mesh).closed);
-    // Half a cell of isolevel makes the radius 0.306.
+    // The isolevel, a quarter of a cell, adds to the radius.
     REQUIRE(
         common::signed_volume(surface->mesh) ==
         Approx(4.0 / 3.0 * std::numbers::pi * std::pow(0.3 + surface->isolevel, 3)).epsilon(0.01));

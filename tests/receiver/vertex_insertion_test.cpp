@@ -67,16 +67,16 @@ TEST_CASE("every point becomes a vertex, and the surface stays a sphere") {
         flip_to_smooth(surface.mesh);
         const common::TriangleMesh mesh = surface.mesh.extract();
         REQUIRE(common::analyse_topology(mesh).euler == 2);
-        // Outward: three points close to one great circle may stand upright, nothing else.
-        std::size_t turned = 0;
+        // Outward: needles of three points close to one great circle may stand as they like,
+        // nothing else.
+        double turned = 0.0;
         for (const auto& [a, b, c] : mesh.triangles) {
             const Vector3d n = (mesh.positions[b] - mesh.positions[a])
                                    .cross(mesh.positions[c] - mesh.positions[a]);
             const Vector3d out = mesh.positions[a] + mesh.positions[b] + mesh.positions[c];
-            turned += n.dot(out) > 0 ? 0 : 1;
-            REQUIRE(n.dot(out) > -0.2 * n.norm() * out.norm());
+            if (n.dot(out) <= 0) turned += 0.5 * n.norm();
         }
-        REQUIRE(turned <= 3);
+        REQUIRE(turned < 0.002);  // of 12.6
     }
 }
 

@@ -51,6 +51,23 @@ std::vector<Vector3d> make_points(std::size_t count, int character, Random& rand
     return points;
 }
 
+// Triangles of several characters: large, small, needles, points, and copies.
+std::vector<Corners> make_triangles(std::size_t count, int character, Random& random) {
+    std::vector<Corners> triangles;
+    while (triangles.size() < count) {
+        const Vector3d a = random_point(random);
+        const double size = character == 0 ? 1.0 : 0.05;
+        const Vector3d u = size * random_direction(random);
+        Vector3d v = size * random_direction(random);
+        if (character == 2) v = u * random.uniform() + 1e-9 * v;
+        if (character == 3) triangles.push_back({a, a, a});
+        triangles.push_back({a, a + u, a + v});
+        if (character == 1) triangles.push_back(triangles.back());
+    }
+    triangles.resize(count);
+    return triangles;
+}
+
 struct Problem {
     QuadraticForm F0, F1;
     double t_max = 0;
@@ -115,18 +132,9 @@ Problem random_problem(const std::vector<Vector3d>& points, Random& random) {
 void check_equal(const std::optional<Contact>& found, const std::optional<Contact>& expected) {
     REQUIRE(found.has_value() == expected.has_value());
     if (!found) return;
+    CHECK(found->constraint == expected->constraint);
     CHECK(found->point == expected->point);
     CHECK(found->t == expected->t);  // to the bit
-}
-
-TEST_CASE("a form is the polynomial of its matrix") {
-    Random random(1);
-    for (int i = 0; i < 100; ++i) {
-        const Matrix4d Q = random_ellipsoid(random);
-        const Vector3d x = random_point(random);
-        const double expected = x.homogeneous().dot(Q * x.homogeneous());
-        CHECK(QuadraticForm(Q)(x) == Approx(expected).margin(1e-14));
-    }
 }
 
 TEST_CASE("the tree finds what a scan finds, to the bit") {
@@ -136,8 +144,27 @@ TEST_CASE("the tree finds what a scan finds, to the bit") {
             CAPTURE(count, character, seed);
             Random random(seed);
             const std::vector<Vector3d> points = make_points(count, character, random);
-            const ConstraintTree tree(points);
-            const tests::ConstraintScan scan(points);
+            const ConstraintTree tree({points, {}});
+            const tests::ConstraintScan scan({points, {}});
+            for (int i = 0; i < 60; ++i) {
+                const Problem problem = random_problem(points, random);
+                check_equal(tree.first_contact(problem.F0, problem.F1, problem.t_max),
+                            scan.first_contact(problem.F0, problem.F1, problem.t_max, {}));
+            }
+        }
+    }
+}
+
+TEST_CASE("the tree finds what a scan finds among triangles, too") {
+    for (const std::size_t count : {1u, 2u, 8u, 9u, 64u, 65u, 600u}) {
+        for (int character = 0; character < 4; ++character) {
+            const std::uint64_t seed = 100 * count + static_cast<std::uint64_t>(character);
+            CAPTURE(count, character, seed);
+            Random random(seed);
+            const std::vector<Vector3d> points = make_points(count / 2 + 1, 0, random);
+            const Constraints constraints{points, make_triangles(count, character, random)};
+            const ConstraintTree tree(constraints);
+            const tests::ConstraintScan scan(constraints);
             for (int i = 0; i < 60; ++i) {
                 const Problem problem = random_problem(points, random);
                 check_equal(tree.first_contact(problem.F0, problem.F1, problem.t_max),
@@ -150,13 +177,13 @@ TEST_CASE("the tree finds what a scan finds, to the bit") {
 TEST_CASE("guesses change nothing, good, bad or repeated") {
     Random random(7);
     const std::vector<Vector3d> points = make_points(3000, 1, random);
-    const ConstraintTree tree(points);
+    const ConstraintTree tree({points, make_triangles(300, 1, random)});
     for (int i = 0; i < 300; ++i) {
         const Problem problem = random_problem(points, random);
         const auto plain = tree.first_contact(problem.F0, problem.F1, problem.t_max);
-        std::vector<std::uint32_t> guesses = {0, 0, 2999};
-        if (plain) guesses.push_back(plain->point);
-        guesses.push_back(static_cast<std::uint32_t>(random.below(3000)));
+        std::vector<std::uint32_t> guesses = {0, 0, 2999, 3299, 3300, 4000'000'000u};
+        if (plain) guesses.push_back(plain->constraint);
+        guesses.push_back(static_cast<std::uint32_t>(random.below(3300)));
         check_equal(tree.first_contact(problem.F0, problem.F1, problem.t_max, guesses), plain);
     }
 }
@@ -167,10 +194,11 @@ TEST_CASE("equal contacts go to the smaller index") {
         {0.3, 0.3, 0.5}, {-0.3, 0.3, 0.5}, {0.3, -0.3, 0.5}, {-0.3, -0.3, 0.5}, {0.3, 0.3, 0.5}};
     const Problem problem = sphere_problem(Vector3d::Zero(), Vector3d::UnitZ());
     for (std::uint32_t guess = 0; guess < points.size(); ++guess) {
-        const auto contact = ConstraintTree(points).first_contact(
-            problem.F0, problem.F1, problem.t_max, std::array<std::uint32_t, 1>{guess});
+        const auto contact = ConstraintTree({points, {}})
+                                 .first_contact(problem.F0, problem.F1, problem.t_max,
+                                                std::array<std::uint32_t, 1>{guess});
         REQUIRE(contact);
-        CHECK(contact->point == 0);
+        CHECK(contact->constraint == 0);
     }
 }
 
@@ -179,8 +207,11 @@ TEST_CASE("a tree over moved points answers for the moved points") {
     const std::vector<Vector3d> points = make_points(2000, 1, random);
     std::vector<Vector3d> moved = points;
     for (Vector3d& p : moved) p += 0.05 * random_point(random);
-    const ConstraintTree tree(moved, ConstraintTree(points));
-    const tests::ConstraintScan scan(moved);
+    const std::vector<Corners> triangles = make_triangles(200, 1, random);
+    std::vector<Corners> moved_triangles = triangles;
+    for (Corners& t : moved_triangles) t[1] += 0.05 * random_point(random);
+    const ConstraintTree tree({moved, moved_triangles}, ConstraintTree({points, triangles}));
+    const tests::ConstraintScan scan({moved, moved_triangles});
     for (int i = 0; i < 200; ++i) {
         const Problem problem = random_problem(moved, random);
         check_equal(tree.first_contact(problem.F0, problem.F1, problem.t_max),
@@ -189,7 +220,7 @@ TEST_CASE("a tree over moved points answers for the moved points") {
 }
 
 TEST_CASE("beyond t_max there is no contact, and at t_max there is") {
-    const ConstraintTree tree({Vector3d(0.0, 0.0, 1.0)});
+    const ConstraintTree tree({{Vector3d(0.0, 0.0, 1.0)}, {}});
     const Problem problem = sphere_problem(Vector3d::Zero(), Vector3d::UnitZ());
     CHECK_FALSE(tree.first_contact(problem.F0, problem.F1, 0.4999));
     const auto contact = tree.first_contact(problem.F0, problem.F1, 0.5);
@@ -198,7 +229,7 @@ TEST_CASE("beyond t_max there is no contact, and at t_max there is") {
 }
 
 TEST_CASE("a point that lies inside from the start stops growth at once") {
-    const ConstraintTree tree({Vector3d(0.0, 0.0, 0.1)});
+    const ConstraintTree tree({{Vector3d(0.0, 0.0, 0.1)}, {}});
     Problem problem = sphere_problem(Vector3d::Zero(), Vector3d::UnitZ());
     problem.F0.c -= 0.25;
     const auto contact = tree.first_contact(problem.F0, problem.F1, 1.0);
@@ -208,7 +239,7 @@ TEST_CASE("a point that lies inside from the start stops growth at once") {
 
 TEST_CASE("an empty tree meets nothing") {
     const Problem problem = sphere_problem(Vector3d::Zero(), Vector3d::UnitZ());
-    CHECK_FALSE(ConstraintTree(std::vector<Vector3d>()).first_contact(problem.F0, problem.F1, 1.0));
+    CHECK_FALSE(ConstraintTree(Constraints{}).first_contact(problem.F0, problem.F1, 1.0));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "common/random.hpp"
 #include "sender/constraint_tree.hpp"
+#include "sender/surface_facets.hpp"
 #include "sender/surface_samples.hpp"
 #include "tests/sender/constraint_scan.hpp"
 #include "tests/support/meshes.hpp"
@@ -63,7 +64,7 @@ std::vector<Vector3d> box_points(const Vector3d& size, int n) {
 
 std::optional<Ellipsoid> grow(const Seed& seed, const std::vector<Vector3d>& points,
                               const GrowthOptions& options = {}) {
-    const ConstraintTree tree(points);
+    const ConstraintTree tree({points, {}});
     GrowthContacts contacts;
     return grow_ellipsoid(seed, tree, tree, options, contacts);
 }
@@ -95,7 +96,7 @@ double value(const Matrix4d& Q, const Vector3d& x) {
 TEST_CASE("the sphere fills a sphere from any seed") {
     const double R = 0.25;
     const std::vector<Vector3d> points = ellipsoid_points(Vector3d::Constant(R), 4000);
-    const ConstraintTree tree(points);
+    const ConstraintTree tree({points, {}});
     Random random(2);
     for (int i = 0; i < 20; ++i) {
         const Vector3d n = random_direction(random);
@@ -108,7 +109,7 @@ TEST_CASE("the sphere fills a sphere from any seed") {
 
 TEST_CASE("the shifted contacts lie on the sphere, by epsilon inside the constraints") {
     const std::vector<Vector3d> points = box_points({0.6, 0.3, 0.3}, 40);
-    const ConstraintTree tree(points);
+    const ConstraintTree tree({points, {}});
     GrowthOptions options;
     options.epsilon = 0.002;
     const Vector3d p(0.01, 0.02, -0.15);
@@ -249,26 +250,44 @@ TEST_CASE("a thin plate gives flat ellipsoids as wide as the aspect allows") {
 
 TEST_CASE("no point lies inside what was grown, and one is touched") {
     const TriangleMesh torus = tests::torus(0.3, 0.12, 60, 30);
-    const SurfaceSamples samples = sample_surface(torus, 0.02);
-    std::vector<Vector3d> points;
-    for (const SurfacePoint& point : samples.points) {
-        points.push_back(point.position(torus.positions));
-    }
-    const ConstraintTree tree(points);
+    const std::vector<Vector3d> normals = inward_vertex_normals(torus);
+    const ConstraintTree tree({torus.positions, {}});
     GrowthContacts contacts;
     std::size_t grown = 0;
-    for (std::size_t i = 0; i < points.size(); i += 7) {
+    for (std::size_t i = 0; i < torus.positions.size(); i += 7) {
         const auto ellipsoid =
-            grow_ellipsoid({points[i], samples.inward[i]}, tree, tree, {}, contacts);
+            grow_ellipsoid({torus.positions[i], normals[i]}, tree, tree, {}, contacts);
         if (!ellipsoid) continue;
         ++grown;
-        CHECK(nearest(*ellipsoid, points) == Approx(1.0).margin(1e-9));
+        CHECK(nearest(*ellipsoid, torus.positions) == Approx(1.0).margin(1e-9));
         const Vector3d axes = common::semi_axes(*ellipsoid);
         CHECK(axes[2] / axes[0] < 8.0 * 1.01);
         // The tube's half-thickness is the largest radius that fits.
         CHECK(axes[0] < 0.1201);
     }
-    CHECK(grown > points.size() / 8);
+    CHECK(grown > torus.positions.size() / 8);
+}
+
+TEST_CASE("whole triangles hold growth back where corners alone would not") {
+    // A rod of 8 vertices: between the corners of its long faces there is nothing to meet.
+    const Vector3d half(0.4, 0.03, 0.02);
+    const TriangleMesh rod = tests::box(2.0 * half, 1);
+    const std::vector<std::uint32_t> large = large_triangles(rod, 0.02);
+    const ConstraintTree tree({rod.positions, offset_triangles(rod, large, 0.004)});
+    const SurfaceSamples seeds = place_seeds(rod, 500, 1);
+    GrowthContacts contacts;
+    double largest = 0.0;
+    for (std::size_t i = 0; i < seeds.points.size(); ++i) {
+        const auto grown =
+            grow_ellipsoid({seeds.points[i], seeds.inward[i]}, tree, tree, {}, contacts);
+        if (!grown) continue;
+        const Eigen::AlignedBox3d box = common::bounding_box(*grown);
+        CHECK((box.max() - half).maxCoeff() < 1e-9);
+        CHECK((-half - box.min()).maxCoeff() < 1e-9);
+        largest = std::max(largest, common::volume(*grown));
+    }
+    // The best of them nearly is the largest ellipsoid of that aspect: 0.16 x 0.03 x 0.02.
+    CHECK(largest > 0.9 * 4.0 / 3.0 * std::numbers::pi * 0.16 * 0.03 * 0.02);
 }
 
 TEST_CASE("unsmoothed samples are touched when the smoothed surface lies inside") {
@@ -276,8 +295,9 @@ TEST_CASE("unsmoothed samples are touched when the smoothed surface lies inside"
     std::vector<Vector3d> inner = outer;
     for (Vector3d& p : inner) p *= 0.97;
     GrowthContacts contacts;
-    const auto grown = grow_ellipsoid({{0.0, 0.0, -0.097}, Vector3d::UnitZ()},
-                                      ConstraintTree(inner), ConstraintTree(outer), {}, contacts);
+    const auto grown =
+        grow_ellipsoid({{0.0, 0.0, -0.097}, Vector3d::UnitZ()}, ConstraintTree({inner, {}}),
+                       ConstraintTree({outer, {}}), {}, contacts);
     REQUIRE(grown);
     CHECK(nearest(*grown, outer) == Approx(1.0));
     CHECK(nearest(*grown, inner) < 1.0);
@@ -286,17 +306,17 @@ TEST_CASE("unsmoothed samples are touched when the smoothed surface lies inside"
 
 TEST_CASE("the tree grows what a plain scan grows, to the bit, warm or cold") {
     const TriangleMesh torus = tests::torus(0.3, 0.12, 40, 20);
-    const SurfaceSamples samples = sample_surface(torus, 0.05);
-    std::vector<Vector3d> points;
-    for (const SurfacePoint& point : samples.points) {
-        points.push_back(point.position(torus.positions));
-    }
-    const ConstraintTree tree(points);
-    const tests::ConstraintScan scan(points);
+    const std::vector<Vector3d> normals = inward_vertex_normals(torus);
+    const std::vector<std::uint32_t> large = large_triangles(torus, 0.06);  // the outer half
+    REQUIRE(large.size() > 100);
+    REQUIRE(large.size() < torus.triangles.size());
+    const Constraints constraints{torus.positions, offset_triangles(torus, large, 0.004)};
+    const ConstraintTree tree(constraints);
+    const tests::ConstraintScan scan(constraints);
     GrowthContacts warm;
-    for (std::size_t i = 0; i < points.size(); i += 3) {
+    for (std::size_t i = 0; i < torus.positions.size(); i += 3) {
         GrowthContacts cold;
-        const Seed seed{points[i], samples.inward[i]};
+        const Seed seed{torus.positions[i], normals[i]};
         const auto by_tree = grow_ellipsoid(seed, tree, tree, {}, warm);
         const auto by_scan = grow_ellipsoid(seed, scan, scan, {}, cold);
         REQUIRE(by_tree.has_value() == by_scan.has_value());
