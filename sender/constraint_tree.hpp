@@ -41,7 +41,7 @@ class ConstraintTree final : public ConstraintSearch {
     [[nodiscard]] const Constraints& constraints() const { return constraints_; }
 
   private:
-    static constexpr std::size_t kLeafPoints = 16;    // 6 cache lines
+    static constexpr std::size_t kLeafPoints = 16;  // 6 cache lines
     static constexpr std::size_t kLeafTriangles = 1;
 
     struct alignas(64) Leaf {
