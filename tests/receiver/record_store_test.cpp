@@ -238,6 +238,23 @@ TEST_CASE("a restarted sender's records join the old ones once those were silent
     CHECK(store.counts().merged == 1);
 }
 
+TEST_CASE("a sender that restarts twice is united with both of its former selves") {
+    const MadeObject sent = made_sphere(600, 6);
+    const auto part = [&](std::uint8_t session, std::size_t k) {
+        return made_datagrams(sent, session_of(session))[k];
+    };
+    RecordStore store;
+    offer(store, part(1, 1), 0s);
+    offer(store, part(2, 2), 1s);
+    offer(store, part(4, 3), 1s, source_at(9));  // a stranger, who stays
+    offer(store, part(3, 4), 10s);
+    offer(store, part(3, 5), 10s);
+    REQUIRE(store.groups().size() == 2);
+    CHECK(store.shown()->senders.size() == 3);
+    CHECK(store.shown()->datagrams == 4);
+    CHECK(store.counts().merged == 2);
+}
+
 TEST_CASE("another address or another hint is never taken for a restart") {
     const MadeObject sent = made_sphere(600, 6);
     MadeObject other_hint = sent;

@@ -120,6 +120,15 @@ TEST_CASE("the stream's end is waited for 250 ms, and what comes in that time co
     }
 }
 
+TEST_CASE("a silence shorter than the wait for the stream's end comes first") {
+    SessionOptions options;
+    options.idle_timeout = 100ms;
+    Run run(options);
+    run.receive(without(made_datagrams(object()), 3));
+    run.pass(1s);
+    CHECK(run.session.ends_by() == EndReason::idle);
+}
+
 TEST_CASE("without the last datagram the silence ends reception, and the tail counts as lost") {
     const auto datagrams = made_datagrams(object());
     SessionOptions options;

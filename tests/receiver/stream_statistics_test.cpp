@@ -99,6 +99,24 @@ TEST_CASE("what was received, less copies, plus lost, is what was sent") {
     CHECK(counts.received - counts.duplicate + counts.lost == 30);
 }
 
+TEST_CASE("copies are told from late datagrams 32767 numbers back") {
+    StreamStatistics statistics(0s);
+    for (std::uint64_t n = 0; n <= 40'000; ++n) statistics.on_datagram(sent_at(n), nth(n, 500), 1);
+    constexpr std::uint64_t kNewest = 40'100;
+    statistics.on_datagram(sent_at(kNewest), nth(kNewest, 500), 1);
+    const std::uint64_t lost = statistics.counts(false).lost;
+    for (std::uint64_t back = 101; back < 32'768; ++back) {
+        statistics.on_datagram(sent_at(kNewest), nth(kNewest - back, 500), 1);
+    }
+    CHECK(statistics.counts(false).duplicate == 32'768 - 101);
+    CHECK(statistics.counts(false).lost == lost);
+    for (std::uint64_t back = 1; back < 100; ++back) {
+        statistics.on_datagram(sent_at(kNewest), nth(kNewest - back, 500), 1);
+    }
+    CHECK(statistics.counts(false).reordered == 99);
+    CHECK(statistics.counts(false).lost == 0);
+}
+
 TEST_CASE("a blackout of more than half the sequence numbers is counted by ordinals") {
     for (const std::uint64_t gap : {40'000u, 65'536u, 70'000u, 500'000u}) {
         CAPTURE(gap);
