@@ -80,9 +80,13 @@ ordered_json sending_json(const Options& options, const SendOutcome& outcome) {
 }  // namespace
 
 double achieved_rate(const SendOutcome& outcome) {
-    const std::uint64_t bytes =
-        outcome.endpoint.bytes + outcome.endpoint.sent * outcome.ip_udp_bytes;
-    return outcome.seconds > 0 ? 8.0 * static_cast<double>(bytes) / outcome.seconds : 0.0;
+    const EndpointCounts& endpoint = outcome.endpoint;
+    if (endpoint.sent < 2 || !(outcome.seconds > 0)) return 0.0;
+    const auto count = static_cast<double>(endpoint.sent);
+    const double bytes =
+        static_cast<double>(endpoint.bytes) + count * static_cast<double>(outcome.ip_udp_bytes);
+    // n datagrams have n - 1 distances.
+    return 8.0 * bytes * (count - 1.0) / count / outcome.seconds;
 }
 
 std::string report_json(const Options& options, const std::vector<LoadedModel>& models,

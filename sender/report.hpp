@@ -24,8 +24,8 @@ struct SendOutcome {
     bool interrupted = false;  // by a signal, before the last round was over
 };
 
-/// Bits per second that left the sockets, headers below the payload included; 0 when nothing was
-/// sent.
+/// Bits per second from the first datagram to the last, headers below the payload included; 0 when
+/// fewer than two were sent.
 double achieved_rate(const SendOutcome& outcome);
 
 /// The JSON of --report:

@@ -101,7 +101,7 @@ void check_round(const RoundPlan& plan, const PlanOptions& options, std::uint32_
 }  // namespace
 
 TEST_CASE("every record is in a round exactly as often as promised, whatever the sizes") {
-    const std::uint64_t seed = GENERATE(range(1, 61));
+    const std::uint64_t seed = GENERATE(range<std::uint64_t>(1, 61));
     common::Random random(seed);
     const auto log_uniform = [&](double low, double high) {
         return static_cast<std::size_t>(low * std::pow(high / low, random.uniform()));

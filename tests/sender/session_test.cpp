@@ -123,6 +123,7 @@ TEST_CASE("several objects take turns in every round, as one stream") {
         plans.emplace_back(made_object(20, 1000 * seed, seed), plan_options(2));
     }
     std::vector<protocol::ObjectId> ids;
+    ids.reserve(plans.size());
     for (const RoundPlan& plan : plans) ids.push_back(plan.object().id);
     Session session(plans, SessionOptions{});
     const std::vector<Sent> all = run(session);
