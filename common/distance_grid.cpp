@@ -39,7 +39,9 @@ void splat(const Ellipsoid& ellipsoid, int k_begin, int k_end, DistanceGrid& gri
         for (int j = range[1][0]; j < range[1][1]; ++j) {
             float* const row = grid.values.data() + frame.index(0, j, k);
             for (int i = range[0][0]; i < range[0][1]; ++i) {
-                const double v = std::min(distance(frame.position(i, j, k)), double{grid.outside});
+                if (row[i] <= -grid.outside) continue;  // the floor: nothing can lower it
+                const double far = grid.outside;
+                const double v = std::clamp(distance(frame.position(i, j, k)), -far, far);
                 // "+ 0" turns -0 into 0, so that the least value is one bit pattern.
                 row[i] = std::min(row[i], static_cast<float>(v) + 0.0F);
             }

@@ -11,8 +11,8 @@
 namespace ellicast::common {
 
 /// The spatial distance field of [BK02] section 2: at every node the least distance estimate over
-/// all ellipsoids whose padded box holds the node, a length, negative inside. Nodes far from all
-/// ellipsoids, and all nodes on the border of the grid, are `outside`.
+/// all ellipsoids whose padded box holds the node, a length, negative inside, cut at -outside and
+/// outside. Nodes far from all ellipsoids, and all nodes on the border of the grid, are `outside`.
 struct DistanceGrid {
     GridFrame frame;
     float outside = 0;          // positive

@@ -42,7 +42,7 @@ std::optional<Ellipsoid> ellipsoid_from_quadric(const Eigen::Matrix4d& Q) {
     if (!(lambda[0] > 1e-12 * lambda[2]) || !(lambda[2] > 0.0)) return std::nullopt;
 
     // Centre: A c + b = 0. Scale: at the centre the form takes its least value, -k.
-    const Eigen::Matrix3d V = eigen.eigenvectors();
+    const Eigen::Matrix3d& V = eigen.eigenvectors();
     const Eigen::Vector3d b = Q.topRightCorner<3, 1>();
     Ellipsoid ellipsoid;
     ellipsoid.center = -(V * (V.transpose() * b).cwiseQuotient(lambda));

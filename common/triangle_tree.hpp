@@ -9,17 +9,9 @@
 #include <vector>
 
 #include "common/triangle_mesh.hpp"
+#include "common/triangle_point.hpp"
 
 namespace ellicast::common {
-
-/// Closest point of triangle abc to x ([E05] section 5.1.5), with barycentric coordinates of a, b,
-/// c. Degenerate triangles are treated as the segment or point they are.
-struct TrianglePoint {
-    Eigen::Vector3d point = Eigen::Vector3d::Zero();
-    Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
-};
-TrianglePoint closest_point_on_triangle(const Eigen::Vector3d& x, const Eigen::Vector3d& a,
-                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
 /// A bounding-volume tree over the triangles of a mesh, for exact closest-point queries. Built
 /// once, deterministic, safe to query from many threads. Keeps its own copy of the corner

@@ -19,8 +19,8 @@ namespace {
 constexpr int kMarginCells = 4;
 
 // In cells, in the order in which they are preferred when no received point can tell (DESIGN
-// section 4).
-constexpr std::array<double, 5> kIsolevels = {0.5, 0.25, 0.75, 1.0, 1.5};
+// section 4, which begins with 0.5; the surface of the ellipsoids lies nearer to 0.2).
+constexpr std::array<double, 5> kIsolevels = {0.25, 0.5, 0.75, 1.0, 1.5};
 
 // With points, on top of the local isolevel.
 constexpr std::array<double, 5> kOffsets = {0.0, 0.25, -0.25, 0.5, 1.0};

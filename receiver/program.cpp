@@ -1,53 +1,25 @@
 // receiver/program.cpp
 #include "receiver/program.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "common/mesh_distance.hpp"
 #include "common/model_io.hpp"
 #include "receiver/output_files.hpp"
 #include "receiver/progress.hpp"
 #include "receiver/report.hpp"
+#include "receiver/stage_clock.hpp"
 #include "receiver/udp_endpoint.hpp"
 
 namespace ellicast::receiver {
 namespace {
-
-/// Seconds by stage; a stage lasts until the next one begins.
-class StageClock {
-  public:
-    void begin(const std::string& stage) {
-        end();
-        stage_ = stage;
-        start_ = std::chrono::steady_clock::now();
-    }
-    void end() {
-        if (stage_.empty()) return;
-        const std::chrono::duration<double> lasted = std::chrono::steady_clock::now() - start_;
-        for (auto& [name, seconds] : seconds_) {
-            if (name == stage_) {
-                seconds += lasted.count();
-                stage_.clear();
-                return;
-            }
-        }
-        seconds_.emplace_back(std::exchange(stage_, {}), lasted.count());
-    }
-    [[nodiscard]] const StageSeconds& seconds() const { return seconds_; }
-
-  private:
-    std::string stage_;
-    std::chrono::steady_clock::time_point start_;
-    StageSeconds seconds_;
-};
 
 /// What is in hand once reception is over.
 struct Reception {
@@ -124,6 +96,9 @@ void warn_of_oddities(const ReportContent& content) {
         spdlog::warn("{} records beyond the memory limit were refused",
                      content.session.store.refused);
     }
+    if (content.object && !content.object->description) {
+        spdlog::warn("no description arrived: name and origin of the model are unknown");
+    }
     if (content.object && is_complete(*content.object) && !content.id_verified) {
         spdlog::warn("the object is complete, but its records are not those of its id");
     }
@@ -135,8 +110,10 @@ std::optional<Reconstruction> rebuild(const Options& options, const ReceivedObje
     how.grid = options.grid;
     how.threads = options.threads;
     how.keep_stages = options.stages.has_value();
+    ProgressLine progress(!options.quiet);
     how.on_stage = [&](const char* stage) {
         spdlog::debug("stage {}", stage);
+        progress.update(fmt::format("rebuilding: {}", stage));
         clock.begin(stage);
     };
     return reconstruct(object, how);
@@ -195,7 +172,7 @@ ExitCode run(const Options& options) {
         content.quality = &*quality;
     }
     clock.end();
-    content.seconds = clock.seconds();
+    content.times = clock.times();
 
     if (options.report) write_report(*options.report, content);
     warn_of_oddities(content);

@@ -19,7 +19,7 @@ struct ReconstructionOptions {
     unsigned threads = 0;  // does not change the result
     bool keep_stages = false;
     /// Called with the name of the stage that begins; for progress and timing. May be empty.
-    std::function<void(const char* stage)> on_stage;
+    std::function<void(const char* stage)> on_stage = {};
 };
 
 /// Figure 7 of [BK02], as meshes in the object's frame plus origin.

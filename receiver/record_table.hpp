@@ -158,10 +158,11 @@ Insertion RecordTable<Record>::insert_dense(std::uint32_t index, const Record& r
     return Insertion::conflicting;
 }
 
-// Stays sparse when the budget cannot hold both forms for a moment.
+// Stays sparse when the budget cannot hold both forms for a moment. What the sparse form holds does
+// not count against the table's share, for it goes back at once.
 template <class Record>
 void RecordTable<Record>::densify(MemoryBudget& budget) {
-    if (!budget.take(dense_bytes(), bytes_)) return;
+    if (!budget.take(dense_bytes(), 0)) return;
     present_.resize(words());
     disputed_.resize(words());
     dense_.resize(expected_);

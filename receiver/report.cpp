@@ -155,6 +155,8 @@ std::string mesh_line(const ReportContent& content) {
 
 nlohmann::ordered_json make_report(const ReportContent& content) {
     Json report;
+    report["program"] = "ellicast-recv";
+    report["version"] = ELLICAST_VERSION;
     report["ends_by"] = std::string(to_string(content.session.ends_by));
     report["output"] = content.output.empty() ? Json(nullptr) : Json(content.output);
     report["object"] = object_json(content);
@@ -164,7 +166,9 @@ nlohmann::ordered_json make_report(const ReportContent& content) {
     add_mesh(content, report);
     if (content.quality) report["quality"] = quality_json(*content.quality);
     report["seconds"] = Json::object();
-    for (const auto& [stage, seconds] : content.seconds) report["seconds"][stage] = seconds;
+    for (const StageTime& time : content.times) {
+        report["seconds"][time.stage] = {{"wall", time.wall_s}, {"cpu", time.cpu_s}};
+    }
     return report;
 }
 

@@ -6,18 +6,15 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/mesh_distance.hpp"
 #include "receiver/received_object.hpp"
 #include "receiver/reconstruction.hpp"
 #include "receiver/session.hpp"
+#include "receiver/stage_clock.hpp"
 
 namespace ellicast::receiver {
-
-/// Wall-clock seconds of named stages, in order of first appearance.
-using StageSeconds = std::vector<std::pair<std::string, double>>;
 
 /// All that a run of the receiver has to tell. Pointers may be null: nothing received, nothing
 /// rebuilt, nothing compared.
@@ -29,11 +26,12 @@ struct ReportContent {
     const common::MeshDistance* quality = nullptr;
     bool id_verified = false;
     std::string output;  // path of the mesh, "" when none was written
-    StageSeconds seconds;
+    std::vector<StageTime> times;
 };
 
 // clang-format off
 /// The report, whose keys are:
+///   program, version
 ///   ends_by       complete, stream_end, round, idle, waited or interrupted (EndReason)
 ///   output        path of the mesh, or null
 ///   object        {id, name, unit, complete, id_verified}, or null when nothing was received
@@ -54,7 +52,7 @@ struct ReportContent {
 ///   not_inserted  indices of received vertices that are no vertex of the mesh
 ///   quality       {rms, mean, max, rms_to_reference, rms_from_reference, normal_deg}: shares of
 ///                   the reference's diagonal, degrees; only with a reference and a mesh
-///   seconds       {stage: wall-clock seconds}
+///   seconds       {stage: {wall, cpu}}
 // clang-format on
 nlohmann::ordered_json make_report(const ReportContent& content);
 

@@ -29,7 +29,7 @@ std::vector<std::uint32_t> insert_points(PointSurface& surface,
                                          std::span<const Eigen::Vector3d> points,
                                          std::span<const std::uint32_t> chosen, unsigned threads);
 
-/// Moves every vertex that stands for a point onto it, and flips what that folds.
+/// Moves every vertex that stands for a point onto it. Faces may fold; flips mend that afterwards.
 void shift_to_points(PointSurface& surface, std::span<const Eigen::Vector3d> points);
 
 }  // namespace ellicast::receiver

@@ -188,7 +188,7 @@ std::string decomposition_key(const common::TriangleMesh& solid,
     bytes.u64(static_cast<std::uint64_t>(options.grid));
     bytes.u64(static_cast<std::uint64_t>(options.presmooth));
     bytes.f64(options.epsilon);
-    bytes.f64(options.sample_spacing);
+    bytes.f64(options.facet_edge);
     bytes.f64(options.max_aspect);
     bytes.u64(options.seed);
     digest.update(as_octets(bytes.view()));

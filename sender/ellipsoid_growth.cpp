@@ -65,7 +65,7 @@ Vector3d shifted_inwards(const Matrix4d& Q, const Vector3d& r, double epsilon) {
 }
 
 // Stage two, [BK02] eq. (1) and (2).
-StretchedEllipsoid grow_in_wedge(const TouchingSphere& sphere, const ConstraintTree& constraints,
+StretchedEllipsoid grow_in_wedge(const TouchingSphere& sphere, const ConstraintSearch& constraints,
                                  const GrowthOptions& options, Guesses guesses,
                                  GrowthContacts& contacts) {
     const Matrix4d Q1 = sphere_quadric(sphere);
@@ -75,8 +75,8 @@ StretchedEllipsoid grow_in_wedge(const TouchingSphere& sphere, const ConstraintT
     const std::optional<Contact> contact = constraints.first_contact(F1, F2, alpha, guesses);
     std::optional<Vector3d> shifted;
     if (contact) {
-        contacts.add(contact->point);
-        const Vector3d& r = constraints.points()[contact->point];
+        contacts.add(contact->constraint);
+        const Vector3d& r = contact->point;
         const double epsilon = std::min(options.epsilon, 0.1 * sphere.radius);
         shifted = shifted_inwards(Q1 + contact->t * Q2, r, epsilon);
         // The alpha whose ellipsoid passes through r' instead of r.
@@ -98,7 +98,7 @@ double largest_beta(const Ellipsoid& ellipsoid, const Vector3d& normal,
 
 // Stage three, [BK02] eq. (3).
 Matrix4d grow_along_cylinder(const StretchedEllipsoid& stretched, const Vector3d& p,
-                             const ConstraintTree& constraints, const GrowthOptions& options,
+                             const ConstraintSearch& constraints, const GrowthOptions& options,
                              Guesses guesses, GrowthContacts& contacts) {
     if (stretched.normal.isZero()) return stretched.Q;
     const std::optional<Ellipsoid> ellipsoid = common::ellipsoid_from_quadric(stretched.Q);
@@ -109,7 +109,7 @@ Matrix4d grow_along_cylinder(const StretchedEllipsoid& stretched, const Vector3d
     const std::optional<Contact> contact =
         constraints.first_contact(QuadraticForm(stretched.Q), QuadraticForm(Q3), beta, guesses);
     if (contact) {
-        contacts.add(contact->point);
+        contacts.add(contact->constraint);
         beta = contact->t;
     }
     return stretched.Q + beta * Q3;
@@ -117,7 +117,7 @@ Matrix4d grow_along_cylinder(const StretchedEllipsoid& stretched, const Vector3d
 
 // Scales about the centre until the surface's points are touched. d'Ad = s^2 is the same question
 // once more: F0 = d'Ad, F1 = -1, t = s^2.
-std::optional<Ellipsoid> inflate(Ellipsoid ellipsoid, const ConstraintTree& surface,
+std::optional<Ellipsoid> inflate(Ellipsoid ellipsoid, const ConstraintSearch& surface,
                                  const GrowthOptions& options, GrowthContacts& contacts) {
     Matrix4d Q = common::quadric_matrix(ellipsoid);
     Q(3, 3) += 1.0;  // d'Ad
@@ -126,7 +126,7 @@ std::optional<Ellipsoid> inflate(Ellipsoid ellipsoid, const ConstraintTree& surf
     const double t_max = largest_scale * largest_scale;
     const std::optional<Contact> contact = surface.first_contact(
         QuadraticForm(Q), linear_form(Vector3d::Zero(), -1.0), t_max, contacts.view());
-    if (contact) contacts.add(contact->point);
+    if (contact) contacts.add(contact->constraint);
     const double scale = std::sqrt(contact ? contact->t : t_max);
     if (!(scale * axes[0] >= options.min_radius)) return std::nullopt;
     ellipsoid.L *= scale;
@@ -135,7 +135,7 @@ std::optional<Ellipsoid> inflate(Ellipsoid ellipsoid, const ConstraintTree& surf
 
 }  // namespace
 
-std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintTree& constraints,
+std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintSearch& constraints,
                                           const GrowthOptions& options, Guesses guesses) {
     const Vector3d& n = seed.inward;
     const Vector3d p = seed.point + 0.1 * options.epsilon * n;
@@ -149,8 +149,8 @@ std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintTree
     sphere.center = p + r_opt * n;
     sphere.radius = r_opt - std::min(options.epsilon, 0.1 * r_opt);
     if (!(sphere.radius >= options.min_radius)) return std::nullopt;
-    sphere.touched = contact->point;
-    const Vector3d to_q = constraints.points()[contact->point] - sphere.center;
+    sphere.touched = contact->constraint;
+    const Vector3d to_q = contact->point - sphere.center;
     sphere.p = sphere.center - sphere.radius * n;
     sphere.q = sphere.center + sphere.radius * to_q.normalized();
     return sphere;
@@ -192,9 +192,9 @@ Matrix4d profile_cylinder(const Matrix4d& Q, const Vector3d& point, const Vector
     return P.transpose() * Q * P;
 }
 
-std::optional<Ellipsoid> grow_ellipsoid(const Seed& seed, const ConstraintTree& constraints,
-                                        const ConstraintTree& surface, const GrowthOptions& options,
-                                        GrowthContacts& contacts) {
+std::optional<Ellipsoid> grow_ellipsoid(const Seed& seed, const ConstraintSearch& constraints,
+                                        const ConstraintSearch& surface,
+                                        const GrowthOptions& options, GrowthContacts& contacts) {
     const GrowthContacts near_by = contacts;
     contacts = {};
     const std::optional<TouchingSphere> sphere =

@@ -5,9 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "common/ellipsoid.hpp"
-#include "sender/constraint_tree.hpp"
+#include "sender/constraint_search.hpp"
 
 namespace ellicast::sender {
 
@@ -27,17 +28,19 @@ struct GrowthOptions {
         1e-5;  // of the result; below, nothing is gained and receivers would refuse it
 };
 
-/// Constraint points met by a growth, in the order of its stages. They are likely to be met by the
+/// Constraints met by a growth, in the order of its stages. They are likely to be met by the
 /// growth from a seed near by, too, and make its search short.
 struct GrowthContacts {
     static constexpr std::size_t kMax = 4;
-    std::array<std::uint32_t, kMax> points{};
+    std::array<std::uint32_t, kMax> constraints{};
     std::size_t count = 0;
 
-    void add(std::uint32_t point) {
-        if (count < kMax) points[count++] = point;
+    void add(std::uint32_t constraint) {
+        if (count < kMax) constraints[count++] = constraint;
     }
-    [[nodiscard]] std::span<const std::uint32_t> view() const { return {points.data(), count}; }
+    [[nodiscard]] std::span<const std::uint32_t> view() const {
+        return {constraints.data(), count};
+    }
 };
 
 /// The sphere of stage one, already shrunk by epsilon about its centre. p and q are the shifted
@@ -48,13 +51,13 @@ struct TouchingSphere {
     double radius = 0;
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     Eigen::Vector3d q = Eigen::Vector3d::Zero();
-    std::uint32_t touched = 0;  // constraint point behind q
+    std::uint32_t touched = 0;  // constraint behind q
 };
 
 /// Stage one, [BK02] section 3.2: the largest sphere that touches the seed from inside and holds no
 /// constraint. Empty when nothing is met up to max_radius (an open or inverted surface), or when
 /// the sphere is too small to be shrunk.
-std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintTree& constraints,
+std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintSearch& constraints,
                                           const GrowthOptions& options,
                                           std::span<const std::uint32_t> guesses);
 
@@ -79,8 +82,9 @@ Eigen::Matrix4d profile_cylinder(const Eigen::Matrix4d& Q, const Eigen::Vector3d
 /// centre until the points of `surface`, those of the unsmoothed mesh, are touched. No point of
 /// `surface` lies inside the result (up to rounding). Empty when a stage fails; see the stages.
 /// `contacts`: in, those of a growth near by or none; out, those of this one.
-std::optional<common::Ellipsoid> grow_ellipsoid(const Seed& seed, const ConstraintTree& constraints,
-                                                const ConstraintTree& surface,
+std::optional<common::Ellipsoid> grow_ellipsoid(const Seed& seed,
+                                                const ConstraintSearch& constraints,
+                                                const ConstraintSearch& surface,
                                                 const GrowthOptions& options,
                                                 GrowthContacts& contacts);
 

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <limits>
-#include <map>
 #include <stdexcept>
 
 #include "common/loss_options.hpp"
@@ -28,14 +27,14 @@ Examples:
 
 Exit codes: 0 done, 2 usage or input error.)";
 
-const std::map<std::string, Criterion> kCriteria{{"volume", Criterion::volume},
-                                                 {"robust", Criterion::robust}};
+const std::vector<std::string> kCriteria{"volume", "robust"};
 const std::vector<std::string> kLogLevels{"trace", "debug", "info", "warn", "error", "off"};
 constexpr const char* kIdentityGroup = "Identity of the stream (random unless given; for tests)";
 
 // Texts as they come from the command line, before they mean anything.
 struct Texts {
     std::string to;
+    std::string criterion = "robust";
     std::string rate = "20M";
     std::string rounds = "1";
     std::string cache;
@@ -121,10 +120,11 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
                             "Ellipsoids that approximate the volume");
     add_number<std::size_t>(app, "--candidates", geometry.candidates, 1, 10'000'000,
                             "Seeds to grow candidates from");
-    app.add_option("--criterion", geometry.criterion, "How to select them")
+    app.add_option("--criterion", texts.criterion,
+                   "How to select them: volume, or robust against loss")
         ->type_name("RULE")
-        ->transform(CLI::CheckedTransformer(kCriteria).description("{volume,robust}"))
-        ->default_str("robust");
+        ->check(CLI::IsMember(kCriteria).description(""))
+        ->capture_default_str();
     add_number<std::uint64_t>(
         app, "--seed", geometry.seed, 0, std::numeric_limits<std::uint64_t>::max(),
         "Of seeds and of the order of vertices; another seed, another object");
@@ -206,6 +206,8 @@ void interpret(const Texts& texts, Options& options) {
         if (text.empty()) return std::nullopt;
         return text;
     };
+    options.decomposition.criterion =
+        texts.criterion == "volume" ? Criterion::volume : Criterion::robust;
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);

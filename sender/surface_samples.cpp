@@ -3,10 +3,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cassert>
+#include <array>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 
 namespace ellicast::sender {
 namespace {
@@ -27,115 +26,32 @@ Vector3d area_vector(const TriangleMesh& mesh, const Triangle& t) {
     return (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a);
 }
 
-Vector3d inward_normal(const TriangleMesh& mesh, const Triangle& t) {
-    return unit_or_zero(-area_vector(mesh, t));
-}
-
-double edge_length(const TriangleMesh& mesh, std::uint32_t a, std::uint32_t b) {
-    return (mesh.positions[a] - mesh.positions[b]).norm();
-}
-
 // Squared length of the side opposite each corner.
 std::array<double, 3> squared_sides(const TriangleMesh& mesh, const Triangle& t) {
     const Vector3d &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
     return {(b - c).squaredNorm(), (c - a).squaredNorm(), (a - b).squaredNorm()};
 }
 
-int parts_of(double length, double spacing) {
-    return std::max(1, static_cast<int>(std::ceil(length / spacing)));
-}
+}  // namespace
 
-void add_vertices(const TriangleMesh& mesh, SurfaceSamples& samples) {
-    const std::vector<Vector3d> normals = inward_vertex_normals(mesh);
+std::vector<std::uint32_t> used_vertices(const TriangleMesh& mesh) {
     std::vector<bool> used(mesh.positions.size(), false);
     for (const Triangle& t : mesh.triangles) {
         for (const std::uint32_t corner : t) used[corner] = true;
     }
+    std::vector<std::uint32_t> vertices;
     for (std::uint32_t v = 0; v < used.size(); ++v) {
-        if (!used[v]) continue;
-        samples.points.push_back({{v, v, v}, Vector3d(1.0, 0.0, 0.0)});
-        samples.inward.push_back(normals[v]);
+        if (used[v]) vertices.push_back(v);
     }
+    return vertices;
 }
-
-// A side of a triangle, low index first.
-struct Side {
-    std::uint32_t low = 0;
-    std::uint32_t high = 0;
-    std::uint32_t triangle = 0;
-
-    [[nodiscard]] bool same_edge(const Side& other) const {
-        return low == other.low && high == other.high;
-    }
-};
-
-std::vector<Side> long_sides(const TriangleMesh& mesh, double spacing) {
-    std::vector<Side> sides;
-    for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-        const Triangle& t = mesh.triangles[f];
-        for (std::size_t i = 0; i < 3; ++i) {
-            const auto [low, high] = std::minmax(t[i], t[(i + 1) % 3]);
-            if ((mesh.positions[low] - mesh.positions[high]).squaredNorm() > spacing * spacing) {
-                sides.push_back({low, high, f});
-            }
-        }
-    }
-    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-        if (a.low != b.low) return a.low < b.low;
-        if (a.high != b.high) return a.high < b.high;
-        return a.triangle < b.triangle;
-    });
-    return sides;
-}
-
-void add_edges(const TriangleMesh& mesh, double spacing, SurfaceSamples& samples) {
-    const std::vector<Side> sides = long_sides(mesh, spacing);
-    for (std::size_t first = 0, last = 0; first < sides.size(); first = last) {
-        const Side& edge = sides[first];
-        Vector3d sum = Vector3d::Zero();
-        for (last = first; last < sides.size() && sides[last].same_edge(edge); ++last) {
-            sum += inward_normal(mesh, mesh.triangles[sides[last].triangle]);
-        }
-        const Vector3d inward = unit_or_zero(sum);
-        const int parts = parts_of(edge_length(mesh, edge.low, edge.high), spacing);
-        for (int k = 1; k < parts; ++k) {
-            const double s = static_cast<double>(k) / parts;
-            samples.points.push_back({{edge.low, edge.high, edge.high}, {1.0 - s, s, 0.0}});
-            samples.inward.push_back(inward);
-        }
-    }
-}
-
-// Rows parallel to the longest edge ab, between it and the opposite corner c.
-void add_interior(const TriangleMesh& mesh, const Triangle& t, double spacing,
-                  SurfaceSamples& samples) {
-    const std::array<double, 3> sides = squared_sides(mesh, t);
-    const auto top = static_cast<std::size_t>(
-        std::distance(sides.begin(), std::max_element(sides.begin(), sides.end())));
-    if (!(sides[top] > spacing * spacing)) return;
-    const std::uint32_t a = t[(top + 1) % 3], b = t[(top + 2) % 3], c = t[top];
-    const double base = std::sqrt(sides[top]);
-    const double height = area_vector(mesh, t).norm() / base;
-    const int rows = parts_of(height, spacing);
-    const Vector3d inward = inward_normal(mesh, t);
-    for (int row = 1; row < rows; ++row) {
-        const double towards_c = static_cast<double>(row) / rows;
-        const int parts = parts_of(base * (1.0 - towards_c), spacing);
-        for (int k = 1; k < parts; ++k) {
-            const double s = (1.0 - towards_c) * k / parts;
-            samples.points.push_back({{a, b, c}, {1.0 - towards_c - s, s, towards_c}});
-            samples.inward.push_back(inward);
-        }
-    }
-}
-
-}  // namespace
 
 std::vector<Vector3d> inward_vertex_normals(const TriangleMesh& mesh) {
     std::vector<Vector3d> sums(mesh.positions.size(), Vector3d::Zero());
     for (const Triangle& t : mesh.triangles) {
         // [M99]: the area vector over the squared lengths of the corner's two sides, that is
-        // sin(angle) / (|u| |v|) times the normal. Exact on spheres, and no angle is computed.
+        // sin(angle) /
+        // (|u| |v|) times the normal. Exact on spheres, and no angle is computed.
         const Vector3d inward = -area_vector(mesh, t);
         const std::array<double, 3> opposite = squared_sides(mesh, t);
         for (std::size_t i = 0; i < 3; ++i) {
@@ -147,56 +63,52 @@ std::vector<Vector3d> inward_vertex_normals(const TriangleMesh& mesh) {
     return sums;
 }
 
-SurfaceSamples sample_surface(const TriangleMesh& mesh, double spacing) {
-    assert(spacing > 0.0);
-    SurfaceSamples samples;
-    samples.points.reserve(mesh.positions.size());
-    samples.inward.reserve(mesh.positions.size());
-    add_vertices(mesh, samples);
-    add_edges(mesh, spacing, samples);
-    for (const Triangle& t : mesh.triangles) add_interior(mesh, t, spacing, samples);
-    return samples;
-}
-
-double default_sample_spacing(const TriangleMesh& mesh) {
-    constexpr double kLongEdge =
-        0.05;  // of the diagonal: longer than any edge of the reference scans
-    double large = 0.0, all = 0.0;
-    for (const Triangle& t : mesh.triangles) {
-        const double area = area_vector(mesh, t).norm();
-        const std::array<double, 3> sides = squared_sides(mesh, t);
-        all += area;
-        if (*std::max_element(sides.begin(), sides.end()) > kLongEdge * kLongEdge) large += area;
-    }
-    return large > 0.2 * all ? 0.01 : 0.02;
-}
-
 SurfaceSamples random_surface_points(const TriangleMesh& mesh, std::size_t count,
                                      common::Random& random) {
     SurfaceSamples samples;
     double total = 0.0;
     for (const Triangle& t : mesh.triangles) total += area_vector(mesh, t).norm();
-    if (!(total > 0.0)) return samples;
+    if (!(total > 0.0) || count == 0) return samples;
+    const double share = total / static_cast<double>(count);
     double before = 0.0;
-    std::size_t k = 0;
-    double target = total * random.uniform() / static_cast<double>(count);
+    double target = share * random.uniform();
     for (const Triangle& t : mesh.triangles) {
         const Vector3d doubled = area_vector(mesh, t);
         const double after = before + doubled.norm();
-        while (k < count && target < after) {
+        while (samples.points.size() < count && target < after) {
             // Uniform in the triangle: the square root keeps area, not length, proportional.
             const double root = std::sqrt(random.uniform());
             const double v = random.uniform();
-            samples.points.push_back(
-                {{t[0], t[1], t[2]}, {1.0 - root, root * (1.0 - v), root * v}});
+            samples.points.push_back((1.0 - root) * mesh.positions[t[0]] +
+                                     root * (1.0 - v) * mesh.positions[t[1]] +
+                                     root * v * mesh.positions[t[2]]);
             samples.inward.push_back(unit_or_zero(-doubled));
-            ++k;
-            target =
-                total * (static_cast<double>(k) + random.uniform()) / static_cast<double>(count);
+            target = share * (static_cast<double>(samples.points.size()) + random.uniform());
         }
         before = after;
     }
     return samples;
+}
+
+SurfaceSamples place_seeds(const TriangleMesh& mesh, std::size_t count, std::uint64_t seed) {
+    common::Random random(seed);
+    std::vector<std::uint32_t> vertices = used_vertices(mesh);
+    common::shuffle(vertices, random);
+    vertices.resize(std::min(vertices.size(), count / 2));
+    const std::vector<Vector3d> normals = inward_vertex_normals(mesh);
+    SurfaceSamples seeds;
+    for (const std::uint32_t v : vertices) {
+        if (normals[v].isZero()) continue;
+        seeds.points.push_back(mesh.positions[v]);
+        seeds.inward.push_back(normals[v]);
+    }
+    const SurfaceSamples by_area = random_surface_points(mesh, count - seeds.points.size(), random);
+    for (std::size_t i = 0; i < by_area.points.size(); ++i) {
+        if (by_area.inward[i].isZero()) continue;
+        seeds.points.push_back(by_area.points[i]);
+        seeds.inward.push_back(by_area.inward[i]);
+    }
+    return seeds;
 }
 
 }  // namespace ellicast::sender

@@ -11,38 +11,20 @@
 
 namespace ellicast::sender {
 
-/// A point that moves with its mesh: sum of weights[i] times corner i. Weights are at least 0,
-/// sum 1.
-struct SurfacePoint {
-    std::array<std::uint32_t, 3> corners{0, 0, 0};  // indices into TriangleMesh::positions
-    Eigen::Vector3d weights = Eigen::Vector3d(1.0, 0.0, 0.0);
-
-    [[nodiscard]] Eigen::Vector3d position(const std::vector<Eigen::Vector3d>& positions) const {
-        return weights[0] * positions[corners[0]] + weights[1] * positions[corners[1]] +
-               weights[2] * positions[corners[2]];
-    }
-};
-
 /// Points of a surface with the unit normals that point into the solid (zero where the surface is
-/// degenerate). Two arrays of one length.
+/// degenerate). Two arrays of one length. "Inward" takes a closed, outward oriented mesh for
+/// granted.
 struct SurfaceSamples {
-    std::vector<SurfacePoint> points;
+    std::vector<Eigen::Vector3d> points;
     std::vector<Eigen::Vector3d> inward;
 };
 
-/// Every vertex that a triangle uses (in index order), then points on long edges, then points
-/// inside large triangles, so that no point of the surface is further than `spacing` from a sample.
-/// [BK02] tests vertices alone, which fails on coarse and CAD-like meshes (DESIGN section 3). An
-/// edge of length l gets ceil(l / spacing) - 1 points, each point once however many triangles share
-/// the edge; a triangle gets rows parallel to its longest edge, so that slivers cost no more than
-/// their area. Normals: vertices weighted as [M99] does, edges the mean of their triangles,
-/// triangles their own. Requires spacing > 0 (asserted), a closed outward mesh for "inward" to mean
-/// what it says.
-SurfaceSamples sample_surface(const common::TriangleMesh& mesh, double spacing);
+/// Indices of the vertices that a triangle uses, ascending.
+std::vector<std::uint32_t> used_vertices(const common::TriangleMesh& mesh);
 
-/// Spacing that suits a mesh of bounding-box diagonal 1: 0.01 when much of the area lies in large,
-/// CAD-like triangles, else 0.02.
-double default_sample_spacing(const common::TriangleMesh& mesh);
+/// Inward unit normals of all vertices, weighted as [M99] does (N. Max, Weights for computing
+/// vertex normals from facet normals, 1999); zero where undefined.
+std::vector<Eigen::Vector3d> inward_vertex_normals(const common::TriangleMesh& mesh);
 
 /// `count` points stratified by area: triangle areas are accumulated in index order, point k lies
 /// at area (k + jitter) / count, uniform inside its triangle, with its triangle's normal. Empty
@@ -50,8 +32,10 @@ double default_sample_spacing(const common::TriangleMesh& mesh);
 SurfaceSamples random_surface_points(const common::TriangleMesh& mesh, std::size_t count,
                                      common::Random& random);
 
-/// Inward unit normals of all vertices, weighted as [M99] does (N. Max, Weights for computing
-/// vertex normals from facet normals, 1999); zero where undefined.
-std::vector<Eigen::Vector3d> inward_vertex_normals(const common::TriangleMesh& mesh);
+/// Where growth starts ([BK02] section 3.1: on the surface): up to one half of the seeds are
+/// vertices drawn at random, which stand where the mesh is fine, the others are stratified by area,
+/// which stand wherever there is surface ([BK02] has vertices alone; large triangles would then
+/// grow nothing). Fewer than `count` only where normals are undefined. Follows `seed` alone.
+SurfaceSamples place_seeds(const common::TriangleMesh& mesh, std::size_t count, std::uint64_t seed);
 
 }  // namespace ellicast::sender

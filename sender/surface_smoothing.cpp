@@ -58,7 +58,7 @@ int default_smoothing_steps(const TriangleMesh& mesh) {
     // (0.01) one is best, and below, where edges are the size of the features, any step costs
     // coverage.
     const double edge = mean_edge_length(mesh);
-    if (edge < 0.007) return 3;
+    if (edge < 0.003) return 3;
     if (edge < 0.012) return 1;
     return 0;
 }

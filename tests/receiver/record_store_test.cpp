@@ -306,6 +306,21 @@ TEST_CASE("memory follows what arrived, not what a hint claims") {
     CHECK(store.snapshot()->vertices.size() == arrived);
 }
 
+TEST_CASE("an object of as many vertices as are allowed fits into the bytes that are") {
+    const StoreLimits defaults;
+    MadeObject claim = made_sphere(1 << 10, 2);
+    claim.hint.vertices = 1u << 15;
+    StoreLimits limits;  // the same ratio, a thousandth of the size
+    limits.vertices = claim.hint.vertices;
+    limits.bytes = defaults.bytes / (defaults.vertices / limits.vertices);
+    RecordStore store(limits);
+    for (std::uint32_t k = 0; k < claim.hint.vertices; k += 1 << 10) {
+        offer(store, made_datagram(made_header(claim), k, claim.vertices));
+    }
+    CHECK(store.counts().refused == 0);
+    CHECK(store.shown()->vertices.complete());
+}
+
 TEST_CASE("the limit of bytes refuses records, loses none, and leaves room for others") {
     MadeObject claim = made_sphere(1000, 2);
     claim.hint.vertices = 1u << 24;

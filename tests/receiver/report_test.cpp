@@ -46,7 +46,7 @@ struct Run {
         content.reconstruction = &reconstruction;
         content.quality = &quality;
         content.output = "x.ply";
-        content.seconds = {{"receive", 1.5}, {"insert", 0.5}};
+        content.times = {{"receive", 1.5, 0.1}, {"insert", 0.5, 0.75}};
     }
     ReceivedObject object;
     Reconstruction reconstruction;
@@ -59,9 +59,9 @@ struct Run {
 TEST_CASE("the report has the documented keys") {
     const Run run;
     const auto report = make_report(run.content);
-    CHECK(keys(report) == Names{"ends_by", "output", "object", "hint", "datagrams", "ellipsoids",
-                                "vertices", "records", "others", "mesh", "not_inserted", "quality",
-                                "seconds"});
+    CHECK(keys(report) == Names{"program", "version", "ends_by", "output", "object", "hint",
+                                "datagrams", "ellipsoids", "vertices", "records", "others", "mesh",
+                                "not_inserted", "quality", "seconds"});
     CHECK(keys(report["object"]) == Names{"id", "name", "unit", "complete", "id_verified"});
     CHECK(keys(report["datagrams"]) == Names{"received", "lost", "duplicate", "reordered",
                                              "malformed", "kernel_dropped", "bytes",
@@ -91,7 +91,8 @@ TEST_CASE("the report says what happened") {
     CHECK(report["not_inserted"] == std::vector<int>{7});
     CHECK(report["mesh"]["genus"] == 4);
     CHECK(report["quality"]["rms"] == 0.5);
-    CHECK(report["seconds"]["insert"] == 0.5);
+    CHECK(report["seconds"]["insert"]["wall"] == 0.5);
+    CHECK(report["seconds"]["insert"]["cpu"] == 0.75);
 }
 
 TEST_CASE("a report of nothing keeps its keys, but says null") {

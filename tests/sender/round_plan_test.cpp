@@ -88,8 +88,12 @@ void check_round(const RoundPlan& plan, const PlanOptions& options, std::uint32_
         if (options.copies > 1) REQUIRE(without_ellipsoids < 8);
     }
     REQUIRE(datagrams.front().description.has_value());
-    for (const std::size_t count : ellipsoids) REQUIRE(count == plan.copies());
-    for (const std::size_t count : vertices) REQUIRE(count == 1);
+    const auto all_are = [](const std::vector<std::size_t>& counts, std::size_t value) {
+        return std::all_of(counts.begin(), counts.end(),
+                           [value](std::size_t count) { return count == value; });
+    };
+    REQUIRE(all_are(ellipsoids, plan.copies()));
+    REQUIRE(all_are(vertices, 1));
     REQUIRE(plan.copies() >= options.copies);
     if (options.copies == 1) REQUIRE(plan.copies() == 1);
 }
@@ -119,14 +123,14 @@ TEST_CASE("the smallest and the most lopsided objects make whole rounds") {
     const auto [ellipsoids, vertices] = GENERATE(
         std::pair<std::size_t, std::size_t>{1, 2}, std::pair<std::size_t, std::size_t>{1, 5000},
         std::pair<std::size_t, std::size_t>{400, 2}, std::pair<std::size_t, std::size_t>{5000, 2},
-        std::pair<std::size_t, std::size_t>{5, 100'000});
+        std::pair<std::size_t, std::size_t>{5, 40'000});
     PlanOptions options;
     options.copies = GENERATE(1u, 2u, 3u, 9u);
     options.rounds = 0;
     options.datagram_bytes = GENERATE(576u, 1200u, 65507u);
     CAPTURE(ellipsoids, vertices, options.copies, options.datagram_bytes);
     const RoundPlan plan(made_object(ellipsoids, vertices), options);
-    for (const std::uint32_t round : {0u, 1u, 2u, 77u}) check_round(plan, options, round);
+    for (const std::uint32_t round : {0u, 1u, 77u}) check_round(plan, options, round);
 }
 
 TEST_CASE("ellipsoids come first, then vertices in index order with stride one") {

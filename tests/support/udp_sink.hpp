@@ -21,7 +21,11 @@ class UdpSink {
   public:
     explicit UdpSink(bool v6 = false) : socket_(::socket(v6 ? AF_INET6 : AF_INET, SOCK_DGRAM, 0)) {
         const int buffer = 8 << 20;
-        ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);
+        // With the rights for it, beyond the system's limit: a busy machine may not read for a
+        // while.
+        if (::setsockopt(socket_, SOL_SOCKET, SO_RCVBUFFORCE, &buffer, sizeof buffer) != 0) {
+            ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);
+        }
         sockaddr_in any4{};
         any4.sin_family = AF_INET;
         any4.sin_addr.s_addr = htonl(INADDR_LOOPBACK);

@@ -56,10 +56,11 @@ class Sender {
     Sender& operator=(const Sender&) = delete;
 
     [[nodiscard]] bool connected() const { return connected_; }
-    void send(const std::vector<Datagram>& datagrams) const {
+    void send(const std::vector<Datagram>& datagrams,
+              std::chrono::microseconds pause = 100us) const {
         for (const Datagram& datagram : datagrams) {
             ::send(socket_, datagram.data(), datagram.size(), 0);
-            std::this_thread::sleep_for(100us);
+            if (pause > 0us) std::this_thread::sleep_for(pause);
         }
     }
 
@@ -73,8 +74,11 @@ struct Receiver {
     explicit Receiver(Arguments more = {}, const std::string& listen = "127.0.0.1:0",
                       const std::string& output_name = "out.ply") {
         output = directory.path().string() + "/" + output_name;
-        Arguments arguments{"--listen",    listen,           "--output", output,   "--report",
-                            report_path(), "--idle-timeout", "0.5",      "--grid", "24"};
+        Arguments arguments{"--listen", listen,        "--output",       output,
+                            "--report", report_path(), "--idle-timeout", "0.5"};
+        if (std::find(more.begin(), more.end(), "--grid") == more.end()) {
+            arguments.insert(arguments.end(), {"--grid", "24"});
+        }
         arguments.insert(arguments.end(), more.begin(), more.end());
         process.emplace(ELLICAST_RECV, arguments);
     }
@@ -290,6 +294,32 @@ TEST_CASE("a signal keeps what was received") {
     CHECK(common::analyse_topology(common::read_model(receiver.output)).closed);
 }
 
+TEST_CASE("a signal while the result is made is forgiven once") {
+    Receiver receiver({"--log-level", "debug", "--grid", "64"});
+    Sender(receiver.port()).send(made_datagrams(sphere()));
+    REQUIRE(receiver.process->await_err("stage coarse"));
+    receiver.process->send_signal(SIGINT);
+    REQUIRE(receiver.process->await_err("once more to abort"));
+    SECTION("then all goes on") {
+        CHECK(receiver.process->wait() == 0);
+        CHECK(std::filesystem::exists(receiver.output));
+    }
+    SECTION("the second one aborts, and leaves no half file") {
+        receiver.process->send_signal(SIGINT);
+        CHECK(receiver.process->wait() == 128 + SIGINT);
+        CHECK_FALSE(std::filesystem::exists(receiver.output));
+    }
+}
+
+TEST_CASE("an interrupted reception does not forgive another signal") {
+    Receiver receiver({"--log-level", "debug", "--grid", "64", "--until", "forever"});
+    Sender(receiver.port()).send(made_datagrams(sphere()));
+    receiver.process->send_signal(SIGINT);
+    REQUIRE(receiver.process->await_err("stage coarse"));
+    receiver.process->send_signal(SIGINT);
+    CHECK(receiver.process->wait() == 128 + SIGINT);
+}
+
 TEST_CASE("quiet says nothing but what went wrong") {
     Receiver receiver({"--quiet", "--wait", "0.2"});
     CHECK(receiver.process->wait() == 3);
@@ -349,6 +379,41 @@ TEST_CASE("lost datagrams are counted, at the network's and at this end") {
         CHECK(counts["received"].get<std::size_t>() + counts["lost"].get<std::size_t>() ==
               datagrams.size());
     }
+}
+
+TEST_CASE("what the kernel had no room for is counted, apart from the network's loss") {
+    // One round of an endless carousel, renumbered again and again (WIRE_FORMAT.md: round at 73).
+    constexpr std::uint32_t kRounds = 4500;
+    MadeStream stream;
+    stream.rounds = 0;
+    auto round = made_datagrams(sphere(), stream);
+    Receiver receiver({"--until", "forever"});
+    const Sender sender(receiver.port());
+    receiver.process->send_signal(SIGSTOP);
+    std::uint16_t sequence = stream.first_sequence;
+    for (std::uint32_t r = 0; r < kRounds; ++r) {
+        for (Datagram& datagram : round) {
+            for (std::size_t k = 0; k < 4; ++k) {
+                datagram[73 + k] = static_cast<std::uint8_t>(r >> (8 * (3 - k)));
+            }
+            protocol::stamp(datagram, sequence++, 0);
+        }
+        sender.send(round, 0us);
+    }
+    receiver.process->send_signal(SIGCONT);
+    std::this_thread::sleep_for(500ms);
+    sender.send({round.back()});  // a last copy tells how far the numbers went
+    std::this_thread::sleep_for(100ms);
+    receiver.process->send_signal(SIGINT);
+    CHECK(receiver.process->wait() == 0);
+    const auto counts = receiver.report()["datagrams"];
+    CAPTURE(counts.dump(2));
+    CHECK(counts["kernel_dropped"] > 0);
+    CHECK(counts["lost_in_network"] == 0);
+    CHECK(counts["received"].get<std::size_t>() - counts["duplicate"].get<std::size_t>() +
+              counts["lost"].get<std::size_t>() ==
+          kRounds * round.size());
+    CHECK(holds(receiver.process->err(), "the kernel dropped"));
 }
 
 TEST_CASE("vertices without any ellipsoid exit 3 and say why") {

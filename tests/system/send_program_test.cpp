@@ -48,7 +48,7 @@ std::size_t lines(const std::string& text) {
 
 /// Few candidates, for quick runs.
 Arguments quick(Arguments arguments) {
-    arguments.insert(arguments.end(), {"--candidates", "300", "--ellipsoids", "40"});
+    arguments.insert(arguments.end(), {"--candidates", "120", "--ellipsoids", "40"});
     return arguments;
 }
 
@@ -284,7 +284,7 @@ TEST_CASE("a signal ends a carousel with a report and exit code 0") {
     const int number = GENERATE(SIGINT, SIGTERM);
     Arguments arguments = quick({place.model().string(), "--to",
                                  "127.0.0.1:" + std::to_string(sink.port()), "--rounds", "forever",
-                                 "--rate", "5M", "--report", place.path("report.json").string()});
+                                 "--rate", "2M", "--report", place.path("report.json").string()});
     ChildProcess process(ELLICAST_SEND, arguments);
     REQUIRE(process.await_err("datagrams a round"));
     std::this_thread::sleep_for(300ms);

@@ -1,0 +1,214 @@
+// tests/receiver/reconstruction_test.cpp
+#include "receiver/reconstruction.hpp"
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <set>
+
+#include "common/mesh_distance.hpp"
+#include "common/random.hpp"
+#include "sender/broadcast_object.hpp"
+#include "sender/decomposition.hpp"
+#include "tests/support/meshes.hpp"
+
+namespace ellicast::receiver {
+namespace {
+
+using Eigen::Vector3d;
+
+sender::BroadcastObject object_of(const common::TriangleMesh& mesh, std::size_t ellipsoids = 120) {
+    const sender::PreparedModel model = sender::prepare_model(mesh);
+    sender::DecompositionOptions options;
+    options.ellipsoids = ellipsoids;
+    options.candidates = 600;
+    return sender::make_object(model, sender::promise_topology(model),
+                               sender::decompose(model.solid, options), {"made", 1});
+}
+
+// What is left of an object when each record is lost with the given probability.
+ReceivedObject received(const sender::BroadcastObject& object, double ellipsoid_loss,
+                        double vertex_loss, std::uint64_t seed) {
+    common::Random random(seed);
+    ReceivedObject result;
+    result.id = object.id;
+    result.hint = object.hint;
+    result.description = object.description;
+    for (std::uint32_t i = 0; i < object.ellipsoids.size(); ++i) {
+        if (random.chance(ellipsoid_loss)) continue;
+        result.ellipsoid_index.push_back(i);
+        result.ellipsoids.push_back(object.ellipsoids[i]);
+    }
+    for (std::uint32_t i = 0; i < object.vertices.size(); ++i) {
+        if (random.chance(vertex_loss)) continue;
+        result.vertex_index.push_back(i);
+        result.vertices.push_back(object.vertices[i]);
+    }
+    return result;
+}
+
+using Bits = std::array<float, 3>;
+
+// Every received vertex is in the mesh bit for bit, or is listed.
+void require_positions_kept(const ReceivedObject& object, const Reconstruction& result) {
+    std::set<Bits> in_mesh;
+    REQUIRE(result.vertex_index.size() == result.mesh.positions.size());
+    for (std::size_t i = 0; i < result.mesh.positions.size(); ++i) {
+        if (result.vertex_index[i] == kNotReceived) continue;
+        const Vector3d& p = result.mesh.positions[i];
+        REQUIRE(in_mesh
+                    .insert({static_cast<float>(p.x()), static_cast<float>(p.y()),
+                             static_cast<float>(p.z())})
+                    .second);
+    }
+    std::size_t missing = 0;
+    for (const protocol::VertexRecord& v : object.vertices)
+        missing += 1 - in_mesh.count(v.position);
+    REQUIRE(missing == result.not_inserted.size());
+}
+
+TEST_CASE(
+    "with nothing lost every vertex is there, no other is, and the surface is the original's") {
+    const common::TriangleMesh original = tests::torus(1, 0.4, 60, 30);
+    const sender::BroadcastObject object = object_of(original);
+    const ReceivedObject all = received(object, 0, 0, 1);
+    const std::optional<Reconstruction> result = reconstruct(all);
+    REQUIRE(result);
+    REQUIRE(result->topology_as_promised);
+    REQUIRE(result->topology.genus() == 1);
+    REQUIRE(result->not_inserted.empty());
+    REQUIRE(result->mesh.positions.size() == original.positions.size());
+    require_positions_kept(all, *result);
+    REQUIRE(common::measure_distance(result->mesh, original).rms() < 1e-3);
+}
+
+TEST_CASE("any subset gives a closed manifold with every received vertex in its place") {
+    const sender::BroadcastObject object = object_of(tests::torus(1, 0.4, 40, 20));
+    for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+        INFO("seed " << seed);
+        common::Random random(seed);
+        const double ellipsoid_loss = random.uniform();
+        const double vertex_loss = seed % 4 == 0 ? 1.0 : random.uniform();
+        const ReceivedObject part = received(object, ellipsoid_loss, vertex_loss, seed);
+        if (part.ellipsoids.empty()) continue;
+        const std::optional<Reconstruction> result = reconstruct(part, {.grid = 48});
+        REQUIRE(result);
+        REQUIRE(result->topology.closed);
+        REQUIRE(result->topology.manifold);
+        require_positions_kept(part, *result);
+    }
+}
+
+TEST_CASE("nothing at all, or vertices alone, give no mesh") {
+    const sender::BroadcastObject object = object_of(tests::icosphere(2));
+    REQUIRE_FALSE(reconstruct(received(object, 1, 1, 1)));
+    REQUIRE_FALSE(reconstruct(received(object, 1, 0, 1)));
+}
+
+TEST_CASE("ellipsoids alone give the marching-cubes mesh") {
+    const common::TriangleMesh original = tests::icosphere(3);
+    const std::optional<Reconstruction> result =
+        reconstruct(received(object_of(original), 0, 1, 1));
+    REQUIRE(result);
+    REQUIRE(result->topology_as_promised);
+    for (const std::uint32_t index : result->vertex_index) REQUIRE(index == kNotReceived);
+    REQUIRE(common::measure_distance(result->mesh, original).rms() < 0.01);
+}
+
+TEST_CASE("threads, stages and a missing description change no bit of the mesh") {
+    const sender::BroadcastObject object = object_of(tests::torus(1, 0.4, 40, 20));
+    ReceivedObject part = received(object, 0.1, 0.4, 5);
+    const std::optional<Reconstruction> one = reconstruct(part, {.threads = 1});
+    const std::optional<Reconstruction> many =
+        reconstruct(part, {.threads = 6, .keep_stages = true});
+    part.description.reset();
+    const std::optional<Reconstruction> nameless = reconstruct(part, {.threads = 2});
+    REQUIRE(one);
+    REQUIRE(many);
+    REQUIRE(nameless);
+    for (const auto* other : {&*many, &*nameless}) {
+        REQUIRE(one->mesh.positions == other->mesh.positions);
+        REQUIRE(one->mesh.triangles == other->mesh.triangles);
+        REQUIRE(one->vertex_index == other->vertex_index);
+    }
+    REQUIRE_FALSE(one->stages);
+    REQUIRE(many->stages);
+    REQUIRE(common::analyse_topology(many->stages->marching_cubes).manifold);
+    REQUIRE(common::analyse_topology(many->stages->halfway).manifold);
+    REQUIRE(common::analyse_topology(many->stages->ellipsoids).components ==
+            part.ellipsoids.size());
+}
+
+TEST_CASE("a model far from the origin comes back bit for bit") {
+    common::TriangleMesh mesh = tests::icosphere(3, 2.0);
+    for (Vector3d& p : mesh.positions) {
+        p += Vector3d(4000, -700, 12);
+        p = p.cast<float>().cast<double>();
+    }
+    const sender::BroadcastObject object = object_of(mesh);
+    REQUIRE(object.description.origin[0] != 0.0);
+    const std::optional<Reconstruction> result = reconstruct(received(object, 0, 0, 1));
+    REQUIRE(result);
+    std::set<std::array<double, 3>> original;
+    for (const Vector3d& p : mesh.positions) original.insert({p.x(), p.y(), p.z()});
+    REQUIRE(result->mesh.positions.size() == original.size());
+    for (const Vector3d& p : result->mesh.positions) {
+        REQUIRE(original.count({p.x(), p.y(), p.z()}) == 1);
+    }
+}
+
+TEST_CASE("scale and place of a model do not matter to its topology") {
+    for (const double scale : {1e-6, 1.0, 1e6}) {
+        INFO("scale " << scale);
+        common::TriangleMesh mesh = tests::torus(1, 0.4, 40, 20);
+        for (Vector3d& p : mesh.positions) p *= scale;
+        const std::optional<Reconstruction> result =
+            reconstruct(received(object_of(mesh), 0.05, 0.3, 2));
+        REQUIRE(result);
+        REQUIRE(result->topology_as_promised);
+    }
+}
+
+TEST_CASE("a broken promise is reported, an approximate one is not judged") {
+    const sender::BroadcastObject object = object_of(tests::torus(1, 0.4, 40, 20));
+    ReceivedObject part = received(object, 0, 0.5, 3);
+    part.hint.euler_all = part.hint.euler_largest = -6;  // genus 4: not this object's
+    const std::optional<Reconstruction> broken = reconstruct(part);
+    REQUIRE(broken);
+    REQUIRE_FALSE(broken->topology_as_promised);
+    REQUIRE(broken->judged);
+    part.hint.approximate = true;
+    const std::optional<Reconstruction> unjudged = reconstruct(part);
+    REQUIRE(unjudged);
+    REQUIRE_FALSE(unjudged->judged);
+}
+
+TEST_CASE("records that lie about the shape still give a closed manifold") {
+    const sender::BroadcastObject object = object_of(tests::icosphere(3));
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        INFO("seed " << seed);
+        common::Random random(seed);
+        ReceivedObject part = received(object, 0.5, 0.5, seed);
+        // Any position inside the hinted box passes the wire's checks.
+        for (protocol::VertexRecord& v : part.vertices) {
+            if (random.chance(0.7)) continue;
+            for (std::size_t a = 0; a < 3; ++a) {
+                const double t = random.uniform();
+                v.position[a] =
+                    static_cast<float>((1 - t) * part.hint.box_min[a] + t * part.hint.box_max[a]);
+            }
+        }
+        for (protocol::EllipsoidRecord& e : part.ellipsoids) {
+            if (random.chance(0.7)) continue;
+            e.scalars[4] = static_cast<float>(random.uniform());
+            e.scalars[6] = static_cast<float>(-random.uniform());
+        }
+        const std::optional<Reconstruction> result = reconstruct(part, {.grid = 40});
+        REQUIRE(result);
+        REQUIRE(result->topology.closed);
+        REQUIRE(result->topology.manifold);
+    }
+}
+
+}  // namespace
+}  // namespace ellicast::receiver

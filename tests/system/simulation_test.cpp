@@ -1,0 +1,166 @@
+// tests/system/simulation_test.cpp: both cores joined in one process, on made models.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/mesh_topology.hpp"
+#include "common/model_io.hpp"
+#include "receiver/reconstruction.hpp"
+#include "tests/support/child_process.hpp"
+#include "tests/support/meshes.hpp"
+#include "tests/support/simulation.hpp"
+
+using namespace ellicast;
+
+namespace {
+
+constexpr int kGrid = 40;  // coarse, for quick runs
+
+sender::DecompositionOptions quick(unsigned threads = 0) {
+    sender::DecompositionOptions options;
+    options.ellipsoids = 60;
+    options.candidates = 400;
+    options.grid = 50;
+    options.threads = threads;
+    return options;
+}
+
+tests::SimulatedModel made(const common::TriangleMesh& mesh,
+                           const sender::DecompositionOptions& options = quick()) {
+    const tests::TemporaryDirectory directory;
+    const auto path = directory.path() / "made.ply";
+    common::write_ply(path, mesh);
+    return tests::load_simulated(path, options);
+}
+
+const tests::SimulatedModel& ring() {
+    static const tests::SimulatedModel model = made(tests::torus(1.0, 0.4, 60, 30));
+    return model;
+}
+
+receiver::Reconstruction rebuilt(const receiver::ReceivedObject& object) {
+    receiver::ReconstructionOptions how;
+    how.grid = kGrid;
+    auto result = receiver::reconstruct(object, how);
+    REQUIRE(result.has_value());
+    return *std::move(result);
+}
+
+bool is_closed_manifold(const common::TriangleMesh& mesh) {
+    const common::MeshTopology topology = common::analyse_topology(mesh);
+    return topology.closed && topology.manifold;
+}
+
+std::vector<std::vector<std::uint8_t>> bytes_of(const std::vector<tests::TimedDatagram>& sent) {
+    std::vector<std::vector<std::uint8_t>> bytes;
+    for (const tests::TimedDatagram& datagram : sent) bytes.push_back(datagram.bytes);
+    return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("without loss the ring arrives whole, ends by itself, and is what it was") {
+    const auto reception = tests::receive(tests::broadcast(ring().loaded.object));
+    REQUIRE(reception.object.has_value());
+    CHECK(reception.summary.ends_by == receiver::EndReason::complete);
+    CHECK(receiver::id_matches(*reception.object));
+    const receiver::Reconstruction result = rebuilt(*reception.object);
+    CHECK(tests::is_as_hinted(common::analyse_topology(result.mesh), reception.object->hint));
+    CHECK(result.topology.genus() == 1);
+    CHECK(result.not_inserted.empty());
+    const common::MeshDistance distance =
+        common::measure_distance(result.mesh, ring().original, {.samples = 20'000});
+    CHECK(distance.rms() < 2e-3);
+}
+
+TEST_CASE("the sender's object and rounds do not depend on threads, but on the seed") {
+    for (const auto& mesh : {tests::torus(1.0, 0.4, 60, 30), tests::two_parts()}) {
+        const tests::SimulatedModel one = made(mesh, quick(1));
+        const tests::SimulatedModel two = made(mesh, quick(2));
+        const sender::BroadcastObject& a = one.loaded.object;
+        const sender::BroadcastObject& b = two.loaded.object;
+        CHECK(a.id == b.id);
+        CHECK(a.hint == b.hint);
+        CHECK(a.ellipsoids == b.ellipsoids);
+        CHECK(a.vertices == b.vertices);
+        CHECK(bytes_of(tests::broadcast(a)) == bytes_of(tests::broadcast(b)));
+        sender::DecompositionOptions other = quick(1);
+        other.seed = 2;
+        CHECK(made(mesh, other).loaded.object.id != a.id);
+    }
+}
+
+TEST_CASE("order, copies and threads change no byte of the file") {
+    for (const double drop : {0.0, 0.3, 0.7}) {
+        tests::BroadcastOptions how;
+        how.impairment.drop = drop;
+        how.impairment.seed = 3;
+        const auto datagrams = tests::broadcast(ring().loaded.object, how);
+        const std::string straight = tests::written_bytes(tests::receive(datagrams), 1, kGrid);
+        CHECK_FALSE(straight.empty());
+        CHECK(tests::written_bytes(tests::receive(datagrams), 2, kGrid) == straight);
+        for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+            CAPTURE(drop, seed);
+            const auto mixed = tests::shuffled_with_copies(datagrams, seed);
+            CHECK(tests::written_bytes(tests::receive(mixed), 2, kGrid) == straight);
+        }
+    }
+}
+
+TEST_CASE("one more or one fewer vertex does change the file") {
+    const auto datagrams = tests::broadcast(ring().loaded.object);
+    auto reception = tests::receive(datagrams);
+    const std::string whole = tests::written_bytes(reception, 1, kGrid);
+    reception.object->vertices.pop_back();
+    reception.object->vertex_index.pop_back();
+    CHECK(tests::written_bytes(reception, 1, kGrid) != whole);
+}
+
+TEST_CASE("any single datagram that holds ellipsoids gives a closed manifold") {
+    std::size_t tried = 0;
+    for (const tests::TimedDatagram& datagram : tests::broadcast(ring().loaded.object)) {
+        const auto reception = tests::receive({datagram});
+        REQUIRE(reception.object.has_value());
+        if (reception.object->ellipsoids.empty()) continue;
+        ++tried;
+        REQUIRE(is_closed_manifold(rebuilt(*reception.object).mesh));
+    }
+    CHECK(tried >= 5);
+}
+
+TEST_CASE("whatever the losses, what was received is a closed manifold with it as vertices") {
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+        CAPTURE(seed);
+        tests::BroadcastOptions how;
+        how.datagram_bytes = 576;
+        how.impairment.seed = seed;
+        how.impairment.drop = 0.08 * static_cast<double>(seed);
+        how.impairment.duplicate = 0.2;
+        how.impairment.reorder = 0.2;
+        how.impairment.corrupt = 0.1;
+        how.rounds = seed % 3 == 0 ? 2 : 1;
+        const auto reception = tests::receive(tests::broadcast(ring().loaded.object, how));
+        if (!reception.object || reception.object->ellipsoids.empty()) continue;
+        const receiver::Reconstruction result = rebuilt(*reception.object);
+        CHECK(is_closed_manifold(result.mesh));
+        std::set<std::uint32_t> there(result.vertex_index.begin(), result.vertex_index.end());
+        there.insert(result.not_inserted.begin(), result.not_inserted.end());
+        std::size_t missing = 0;
+        for (const std::uint32_t index : reception.object->vertex_index) {
+            missing += there.count(index) == 0 ? 1 : 0;
+        }
+        CHECK(missing == 0);
+        CHECK(result.not_inserted.size() * 100 <= reception.object->vertices.size());
+    }
+}
+
+TEST_CASE("losses in bursts have the share and the length asked for") {
+    const common::GilbertLoss loss = tests::bursty_loss(0.3, 8);
+    CHECK(loss.good_to_bad / (loss.good_to_bad + loss.bad_to_good) == Approx(0.3));
+    CHECK(1.0 / loss.bad_to_good == Approx(8));
+    CHECK_THROWS_AS(tests::bursty_loss(0.9, 2), std::invalid_argument);
+    CHECK_THROWS_AS(tests::bursty_loss(0.3, 0.5), std::invalid_argument);
+}
