@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -115,6 +117,40 @@ common::GridFrame voxel_centers(const Eigen::AlignedBox3d& box, int cells) {
     return frame;
 }
 
+struct Voxels {
+    common::GridFrame frame;
+    std::vector<std::uint8_t> solid;
+};
+
+// The solid's voxels; finer than asked for while it is so thin that hardly a voxel's centre meets
+// it.
+Voxels voxels_of(const TriangleMesh& solid, const Eigen::AlignedBox3d& box, int cells,
+                 unsigned threads) {
+    constexpr std::ptrdiff_t kFewVoxels = 1000;
+    constexpr std::size_t kMostNodes = 1u << 25;  // 128 MB of gains
+    Voxels voxels{voxel_centers(box, cells), {}};
+    for (;;) {
+        voxels.solid = common::voxelise_solid(solid, voxels.frame, threads);
+        const std::ptrdiff_t inside =
+            std::count_if(voxels.solid.begin(), voxels.solid.end(), [](auto v) { return v != 0; });
+        cells *= 2;
+        const common::GridFrame finer = voxel_centers(box, cells);
+        if (inside >= kFewVoxels || finer.size() > kMostNodes) return voxels;
+        voxels.frame = finer;
+    }
+}
+
+// Largest first: what is left to go by where no voxel can tell what an ellipsoid adds.
+std::vector<std::uint32_t> by_volume(const std::vector<Ellipsoid>& candidates, std::size_t count) {
+    std::vector<std::uint32_t> order(candidates.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+        return common::volume(candidates[a]) > common::volume(candidates[b]);
+    });
+    order.resize(std::min(order.size(), count));
+    return order;
+}
+
 SelectionOptions selection_options(const DecompositionOptions& options, double diagonal) {
     SelectionOptions selection;
     selection.count = options.ellipsoids;
@@ -128,30 +164,42 @@ SelectionOptions selection_options(const DecompositionOptions& options, double d
     return selection;
 }
 
+// Whether there is a frame to compute in: not for the empty mesh, nor for one single point.
+bool has_extent(const TriangleMesh& mesh) {
+    const Eigen::AlignedBox3d box = common::bounding_box(mesh.positions);
+    return !box.isEmpty() && box.diagonal().stableNorm() > 0.0;
+}
+
 }  // namespace
 
 std::vector<Ellipsoid> grow_candidates(const TriangleMesh& solid,
                                        const DecompositionOptions& options) {
+    if (!has_extent(solid)) return {};
     const UnitFrame frame(solid.positions);
-    const GrowthInput input = prepare_growth(frame.to_unit(solid), options);
+    const TriangleMesh unit = frame.to_unit(solid);
+    const Eigen::AlignedBox3d box = common::bounding_box(unit.positions);
     std::vector<Ellipsoid> candidates;
-    for (const std::optional<Ellipsoid>& grown : grow_all(input, options.threads)) {
-        if (grown) candidates.push_back(frame.to_model(*grown));
+    for (const std::optional<Ellipsoid>& grown :
+         grow_all(prepare_growth(unit, options), options.threads)) {
+        // A centre outside the box comes from a patch that is not oriented outwards.
+        if (grown && box.contains(grown->center)) candidates.push_back(frame.to_model(*grown));
     }
     return candidates;
 }
 
 Decomposition select_ellipsoids(const std::vector<Ellipsoid>& candidates, const TriangleMesh& solid,
                                 const DecompositionOptions& options) {
-    const Eigen::AlignedBox3d box = common::bounding_box(solid.positions);
-    const common::GridFrame grid = voxel_centers(box, options.grid);
-    const std::vector<std::uint8_t> voxels = common::voxelise_solid(solid, grid, options.threads);
-    const Selection selection = select_greedily(
-        candidates, grid, voxels, selection_options(options, box.diagonal().stableNorm()));
     Decomposition decomposition;
     decomposition.seeds = options.candidates;
     decomposition.candidates = candidates.size();
-    for (const std::uint32_t chosen : selection.order) {
+    if (candidates.empty() || !has_extent(solid)) return decomposition;
+    const Eigen::AlignedBox3d box = common::bounding_box(solid.positions);
+    const Voxels voxels = voxels_of(solid, box, options.grid, options.threads);
+    const Selection selection =
+        select_greedily(candidates, voxels.frame, voxels.solid,
+                        selection_options(options, box.diagonal().stableNorm()));
+    for (const std::uint32_t chosen :
+         selection.order.empty() ? by_volume(candidates, options.ellipsoids) : selection.order) {
         decomposition.ellipsoids.push_back(candidates[chosen]);
     }
     const double all = std::max(1.0, static_cast<double>(selection.solid));
@@ -165,11 +213,7 @@ Decomposition decompose(const TriangleMesh& solid, const DecompositionOptions& o
     if (candidates.empty()) {
         throw std::invalid_argument("no ellipsoid fits into the model");
     }
-    Decomposition decomposition = select_ellipsoids(candidates, solid, options);
-    if (decomposition.ellipsoids.empty()) {
-        throw std::invalid_argument("no ellipsoid covers a voxel of the model");
-    }
-    return decomposition;
+    return select_ellipsoids(candidates, solid, options);
 }
 
 }  // namespace ellicast::sender

@@ -138,7 +138,9 @@ std::optional<Ellipsoid> inflate(Ellipsoid ellipsoid, const ConstraintSearch& su
 std::optional<TouchingSphere> grow_sphere(const Seed& seed, const ConstraintSearch& constraints,
                                           const GrowthOptions& options, Guesses guesses) {
     const Vector3d& n = seed.inward;
-    const Vector3d p = seed.point + 0.1 * options.epsilon * n;
+    // A hair inwards, so that copies of the seed's own point lie behind it; far less than epsilon,
+    // which may be more than a thin wall has.
+    const Vector3d p = seed.point + 0.01 * options.epsilon * n;
     // r(x) = |x - p|^2 / (2 (x - p)'n): F0 = |x - p|^2, F1 = -2 n'(x - p).
     const std::optional<Contact> contact = constraints.first_contact(
         round_form(p, p.squaredNorm()), linear_form(-2.0 * n, 2.0 * n.dot(p)), options.max_radius,

@@ -92,7 +92,7 @@ class CandidateRows {
 
 void CandidateRows::keep(const GridFrame& frame, unsigned threads) {
     constexpr std::size_t kMostRows = 1u << 25;  // 128 MB
-    if (frame.dims[0] > std::numeric_limits<std::uint16_t>::max()) return;
+    if (layers() > kMostRows || frame.dims[0] > std::numeric_limits<std::uint16_t>::max()) return;
     std::vector<KeptLayer> kept(layers() + 1);
     std::size_t count = 0;
     for (std::size_t c = 0; c < size(); ++c) {
