@@ -155,7 +155,7 @@ TEST_CASE("the end of a middle round ends nothing; the end of the last one does"
     CHECK(run.session.ends_by() == EndReason::stream_end);
 }
 
-TEST_CASE("--until complete outlives the stream's end, and ends by silence") {
+TEST_CASE("option --until complete outlives the stream's end, and ends by silence") {
     Run run(until(Until::complete));
     run.receive(without(made_datagrams(object()), 3));
     run.pass(1900ms);
@@ -164,7 +164,7 @@ TEST_CASE("--until complete outlives the stream's end, and ends by silence") {
     CHECK(run.session.ends_by() == EndReason::idle);
 }
 
-TEST_CASE("--until round ends after a round that was heard from its start") {
+TEST_CASE("option --until round ends after a round that was heard from its start") {
     const auto datagrams = made_datagrams(object(), stream_of(0), 4);
     const std::size_t round = datagrams.size() / 4;
     const auto lossy = [&](std::size_t from, std::size_t to) {
@@ -206,7 +206,7 @@ TEST_CASE("--until round ends after a round that was heard from its start") {
     }
 }
 
-TEST_CASE("--until forever ends only by the user, and keeps what was received") {
+TEST_CASE("option --until forever ends only by the user, and keeps what was received") {
     Run run(until(Until::forever));
     run.receive(made_datagrams(object()));
     run.pass(10min);

@@ -361,7 +361,7 @@ TEST_CASE("every stage's mesh is there and closed") {
     CHECK(tests::read_file(pair.path("stages") / "4-final.ply") == tests::read_file(pair.output()));
 }
 
-TEST_CASE("--until says when it is enough") {
+TEST_CASE("option --until says when it is enough") {
     Pair pair;
     SECTION("complete: rounds go on until nothing is missing") {
         pair.listen({"--until", "complete"});

@@ -228,7 +228,7 @@ TEST_CASE("nothing received exits 3 with a line, whoever ends it") {
     CHECK(report["datagrams"]["received"] == 0);
 }
 
-TEST_CASE("--wait gives up by itself") {
+TEST_CASE("option --wait gives up by itself") {
     Receiver receiver({"--wait", "0.2"});
     CHECK(receiver.process->wait() == 3);
     CHECK(receiver.report()["ends_by"] == "waited");
