@@ -67,7 +67,7 @@ bool acceptable(const Hint& hint) {
     if (!box_is_plausible(hint) || !topology_is_possible(hint)) return false;
     if (hint.vertices > kMaxVertices) return false;
     if (hint.ellipsoids == 0 && hint.vertices == 0) return false;
-    return hint.format == RecordFormat::raw;
+    return hint.format == RecordFormat{};
 }
 
 RecordBounds::RecordBounds(const Hint& hint) {
@@ -137,7 +137,7 @@ EllipsoidRecord load_ellipsoid(const std::uint8_t* p) {
 }
 
 VertexRecord load_vertex(const std::uint8_t* p) {
-    return {{load_f32(p), load_f32(p + 4), load_f32(p + 8)}};
+    return {.position = {load_f32(p), load_f32(p + 4), load_f32(p + 8)}};
 }
 
 }  // namespace ellicast::protocol

@@ -39,6 +39,28 @@ std::string_view to_string(WireError error) {
     return "unknown";
 }
 
+namespace {
+constexpr std::uint8_t kUnknownNormalBits = 0xff;
+constexpr std::uint8_t kFormatRing = 4;
+constexpr std::uint8_t kFormatColour = 8;
+constexpr std::uint8_t kFormatKnown = 15;
+}  // namespace
+
+std::uint8_t RecordFormat::code() const {
+    assert(normal_bits == 0 || normal_bits == 8 || normal_bits == 12 || normal_bits == 16);
+    const int size = normal_bits == 0 ? 0 : normal_bits / 4 - 1;
+    return static_cast<std::uint8_t>(size | (ring ? kFormatRing : 0) |
+                                     (colour ? kFormatColour : 0));
+}
+
+RecordFormat RecordFormat::of_code(std::uint8_t code) {
+    if (code > kFormatKnown) return {.normal_bits = kUnknownNormalBits};
+    const int size = code % 4;
+    return {.normal_bits = static_cast<std::uint8_t>(size == 0 ? 0 : 4 * (size + 1)),
+            .ring = (code & kFormatRing) != 0,
+            .colour = (code & kFormatColour) != 0};
+}
+
 EllipsoidRecord SectionView::ellipsoid(std::size_t k) const {
     assert(kind == SectionKind::ellipsoids && k < count);
     return load_ellipsoid(body.data() + k * kEllipsoidBytes);

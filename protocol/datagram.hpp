@@ -50,13 +50,28 @@ struct EllipsoidRecord {
     bool operator==(const EllipsoidRecord&) const = default;
 };
 
-/// Position x y z; model units, frame as above.
+/// Position x y z; model units, frame as above. What the record format leaves out is zero.
 struct VertexRecord {
     std::array<float, 3> position{};
+    std::uint16_t normal = 0;              // octahedral code of RecordFormat::normal_bits bits
+    std::uint16_t ring = 0;                // of the neighbours in the original mesh
+    std::array<std::uint8_t, 3> colour{};  // red green blue
+    std::uint8_t unused = 0;
     bool operator==(const VertexRecord&) const = default;
 };
 
-enum class RecordFormat : std::uint8_t { raw = 0 };
+/// What a vertex record holds beside its position.
+struct RecordFormat {
+    std::uint8_t normal_bits = 0;  // 0, 8, 12 or 16
+    bool ring = false;
+    bool colour = false;
+    bool operator==(const RecordFormat&) const = default;
+
+    /// The byte on the wire: bits 0-1 the size of the normal, bit 2 ring, bit 3 colour.
+    [[nodiscard]] std::uint8_t code() const;
+    /// Of an unknown code: one that no acceptable hint has.
+    static RecordFormat of_code(std::uint8_t code);
+};
 
 /// What every datagram says of the whole object; enough to rebuild it and to check the result.
 /// Topology is that of the boundary of the union of the solid.
@@ -68,7 +83,7 @@ struct Hint {
     std::int32_t euler_largest = 2;  // of the component with the largest volume
     std::uint16_t ellipsoids = 0;    // distinct records in the object
     std::uint32_t vertices = 0;      // distinct records in the object
-    RecordFormat format = RecordFormat::raw;
+    RecordFormat format;
     bool approximate = false;  // the promise is not to be judged (overlapping parts, inner shells)
     bool operator==(const Hint&) const = default;
 };

@@ -48,7 +48,7 @@ Hint read_hint(ByteReader& reader) {
     hint.euler_largest = reader.i32();
     hint.ellipsoids = reader.u16();
     hint.vertices = reader.u32();
-    hint.format = static_cast<RecordFormat>(reader.u8());
+    hint.format = RecordFormat::of_code(reader.u8());
     return hint;
 }
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/coarse_surface.hpp"
 #include "common/ellipsoid.hpp"
-#include "receiver/coarse_surface.hpp"
 #include "receiver/edge_flips.hpp"
 #include "receiver/ellipsoid_mesh.hpp"
 #include "receiver/shrink_wrap.hpp"
@@ -97,10 +97,10 @@ class Pipeline {
         const protocol::Hint& hint = object_.hint;
         const Vector3d lo(hint.box_min[0], hint.box_min[1], hint.box_min[2]);
         const Vector3d hi(hint.box_max[0], hint.box_max[1], hint.box_max[2]);
-        const PromisedTopology promise{hint.components, hint.euler_all, hint.euler_largest};
-        coarse_ = make_coarse_surface(ellipsoids, points_,
-                                      Eigen::AlignedBox3d(frame_.to_unit(lo), frame_.to_unit(hi)),
-                                      promise, options_.grid, options_.threads);
+        const common::PromisedTopology promise{hint.components, hint.euler_all, hint.euler_largest};
+        coarse_ = common::make_coarse_surface(
+            ellipsoids, points_, Eigen::AlignedBox3d(frame_.to_unit(lo), frame_.to_unit(hi)),
+            promise, options_.grid, options_.threads);
         if (coarse_ && options_.keep_stages) {
             stages_.ellipsoids = to_model_frame(mesh_of(ellipsoids));
             stages_.marching_cubes = to_model_frame(coarse_->mesh);
@@ -244,7 +244,7 @@ class Pipeline {
     const ReconstructionOptions& options_;
     Frame frame_;
     std::vector<Vector3d> points_;
-    std::optional<CoarseSurface> coarse_;
+    std::optional<common::CoarseSurface> coarse_;
     PointSurface surface_;
     std::vector<std::uint32_t> left_out_;
     Stages stages_;

@@ -203,8 +203,9 @@ TEST_CASE("a topology that no closed surface has is a bad hint") {
 
 TEST_CASE("an unknown record format is a bad hint") {
     for (int format = 1; format < 256; ++format) {
-        CHECK(with_hint([&](Hint& h) { h.format = static_cast<RecordFormat>(format); }) ==
-              WireError::bad_hint);
+        CHECK(with_hint([&](Hint& h) {
+                  h.format = RecordFormat::of_code(static_cast<std::uint8_t>(format));
+              }) == WireError::bad_hint);
     }
 }
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "common/coarse_surface.hpp"
 #include "common/model_io.hpp"
 #include "common/random.hpp"
 #include "common/solid_voxels.hpp"
-#include "receiver/coarse_surface.hpp"
 #include "sender/decomposition.hpp"
 #include "sender/ellipsoid_rows.hpp"
 #include "tests/support/meshes.hpp"
@@ -62,7 +62,7 @@ class Overlap {
     std::vector<std::uint8_t> solid_;
 };
 
-receiver::PromisedTopology sphere_with_handles(std::int64_t genus) {
+common::PromisedTopology sphere_with_handles(std::int64_t genus) {
     return {.components = 1, .euler_all = 2 - 2 * genus, .euler_largest = 2 - 2 * genus};
 }
 
@@ -77,7 +77,7 @@ int right_topology(const std::vector<Ellipsoid>& ellipsoids, const TriangleMesh&
         for (const Ellipsoid& e : ellipsoids) {
             if (!random.chance(loss)) received.push_back(e);
         }
-        const auto surface = receiver::make_coarse_surface(
+        const auto surface = common::make_coarse_surface(
             received, {}, box, sphere_with_handles(genus), kReceiverCells, 0);
         right += surface && surface->as_promised ? 1 : 0;
     }

@@ -1,4 +1,4 @@
-// receiver/coarse_surface.hpp
+// common/coarse_surface.hpp
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@
 #include "common/ellipsoid.hpp"
 #include "common/triangle_mesh.hpp"
 
-namespace ellicast::receiver {
+namespace ellicast::common {
 
 /// What the sender promised of the surface, without wire types.
 struct PromisedTopology {
@@ -21,9 +21,9 @@ struct PromisedTopology {
 };
 
 struct CoarseSurface {
-    common::TriangleMesh mesh;  // closed, outward 2-manifold; never empty
-    double isolevel = 0;        // a length
-    double cell = 0;            // spacing of the grid
+    TriangleMesh mesh;    // closed, outward 2-manifold; never empty
+    double isolevel = 0;  // a length
+    double cell = 0;      // spacing of the grid
     bool as_promised = false;
 };
 
@@ -33,10 +33,10 @@ struct CoarseSurface {
 /// received `points`; among none, the one that misses by least. Surplus components below 1 % of the
 /// volume are dropped. Empty when no isolevel gives a surface. Requires at least one ellipsoid.
 /// Threads do not change the result.
-std::optional<CoarseSurface> make_coarse_surface(std::span<const common::Ellipsoid> ellipsoids,
+std::optional<CoarseSurface> make_coarse_surface(std::span<const Ellipsoid> ellipsoids,
                                                  std::span<const Eigen::Vector3d> points,
                                                  const Eigen::AlignedBox3d& box,
                                                  const PromisedTopology& promise, int cells,
                                                  unsigned threads);
 
-}  // namespace ellicast::receiver
+}  // namespace ellicast::common

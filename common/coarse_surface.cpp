@@ -1,5 +1,5 @@
-// receiver/coarse_surface.cpp
-#include "receiver/coarse_surface.hpp"
+// common/coarse_surface.cpp
+#include "common/coarse_surface.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,7 @@
 #include "common/mesh_topology.hpp"
 #include "common/parallel.hpp"
 
-namespace ellicast::receiver {
+namespace ellicast::common {
 namespace {
 
 // Cells around the box: ellipsoids may reach a little beyond it, the highest isolevel 1.5 cells
@@ -30,15 +30,14 @@ constexpr std::array<double, 5> kOffsets = {0.0, 0.25, -0.25, 0.5, 1.0};
 constexpr double kDebrisShare = 0.01;
 
 // Keeps the triangles whose component has keep[c], and renumbers.
-common::TriangleMesh keep_components(const common::TriangleMesh& mesh,
-                                     const std::vector<std::uint32_t>& component,
-                                     const std::vector<bool>& keep) {
-    common::TriangleMesh result;
+TriangleMesh keep_components(const TriangleMesh& mesh, const std::vector<std::uint32_t>& component,
+                             const std::vector<bool>& keep) {
+    TriangleMesh result;
     constexpr std::uint32_t kUnused = 0xffffffffU;
     std::vector<std::uint32_t> number(mesh.positions.size(), kUnused);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         if (!keep[component[t]]) continue;
-        common::Triangle triangle = mesh.triangles[t];
+        Triangle triangle = mesh.triangles[t];
         for (std::uint32_t& v : triangle) {
             if (number[v] == kUnused) {
                 number[v] = static_cast<std::uint32_t>(result.positions.size());
@@ -52,8 +51,8 @@ common::TriangleMesh keep_components(const common::TriangleMesh& mesh,
 }
 
 // Drops the smallest components while there are more than promised and they are debris.
-common::TriangleMesh without_debris(const common::TriangleMesh& mesh, std::size_t promised) {
-    const std::vector<std::uint32_t> component = common::triangle_components(mesh);
+TriangleMesh without_debris(const TriangleMesh& mesh, std::size_t promised) {
+    const std::vector<std::uint32_t> component = triangle_components(mesh);
     if (component.empty()) return mesh;
     const std::size_t count =
         *std::max_element(component.begin(), component.end()) + std::size_t{1};
@@ -85,7 +84,7 @@ common::TriangleMesh without_debris(const common::TriangleMesh& mesh, std::size_
 // them.
 using Miss = std::tuple<std::int64_t, std::int64_t, std::int64_t>;
 
-Miss miss(const common::MeshTopology& topology, const PromisedTopology& promise) {
+Miss miss(const MeshTopology& topology, const PromisedTopology& promise) {
     return {std::abs(static_cast<std::int64_t>(topology.components) -
                      static_cast<std::int64_t>(promise.components)),
             std::abs(topology.euler - promise.euler_all),
@@ -96,7 +95,7 @@ Miss miss(const common::MeshTopology& topology, const PromisedTopology& promise)
 // lattice, one node in kBlockCells cells of the grid.
 class LocalIsolevel {
   public:
-    LocalIsolevel(const common::DistanceGrid& grid, std::span<const Eigen::Vector3d> points)
+    LocalIsolevel(const DistanceGrid& grid, std::span<const Eigen::Vector3d> points)
         : h_(grid.frame.spacing) {
         frame_.origin = grid.frame.origin;
         frame_.spacing = kBlockCells * h_;
@@ -106,7 +105,7 @@ class LocalIsolevel {
         sum_.assign(frame_.size(), 0.0);
         weight_.assign(frame_.size(), 0.0);
         for (const Eigen::Vector3d& x : points) {
-            const double v = std::clamp(common::sample(grid, x), kLowest * h_, kHighest * h_);
+            const double v = std::clamp(sample(grid, x), kLowest * h_, kHighest * h_);
             add(x, v);
         }
         const double total = std::accumulate(weight_.begin(), weight_.end(), 0.0);
@@ -181,50 +180,50 @@ class LocalIsolevel {
     }
 
     double h_;
-    common::GridFrame frame_;
+    GridFrame frame_;
     std::vector<double> sum_;
     std::vector<double> weight_;
     double mean_ = 0.0;
 };
 
 void subtract_local_isolevel(std::span<const Eigen::Vector3d> points, unsigned threads,
-                             common::DistanceGrid& grid) {
+                             DistanceGrid& grid) {
     const LocalIsolevel level(grid, points);
-    const common::GridFrame& frame = grid.frame;
-    common::parallel_for(static_cast<std::size_t>(frame.dims[2]), threads,
-                         [&](std::size_t begin, std::size_t end) {
-                             for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
-                                 for (int j = 0; j < frame.dims[1]; ++j) {
-                                     for (int i = 0; i < frame.dims[0]; ++i) {
-                                         float& v = grid.values[frame.index(i, j, k)];
-                                         if (std::abs(v) > 4.0 * frame.spacing) continue;
-                                         v -= static_cast<float>(level(frame.position(i, j, k)));
-                                     }
-                                 }
+    const GridFrame& frame = grid.frame;
+    parallel_for(static_cast<std::size_t>(frame.dims[2]), threads,
+                 [&](std::size_t begin, std::size_t end) {
+                     for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
+                         for (int j = 0; j < frame.dims[1]; ++j) {
+                             for (int i = 0; i < frame.dims[0]; ++i) {
+                                 float& v = grid.values[frame.index(i, j, k)];
+                                 if (std::abs(v) > 4.0 * frame.spacing) continue;
+                                 v -= static_cast<float>(level(frame.position(i, j, k)));
                              }
-                         });
+                         }
+                     }
+                 });
 }
 
 }  // namespace
 
-std::optional<CoarseSurface> make_coarse_surface(std::span<const common::Ellipsoid> ellipsoids,
+std::optional<CoarseSurface> make_coarse_surface(std::span<const Ellipsoid> ellipsoids,
                                                  std::span<const Eigen::Vector3d> points,
                                                  const Eigen::AlignedBox3d& box,
                                                  const PromisedTopology& promise, int cells,
                                                  unsigned threads) {
-    const common::GridFrame frame = common::make_grid_frame(box, cells, kMarginCells);
-    common::DistanceGrid grid = common::make_distance_grid(ellipsoids, frame, threads);
+    const GridFrame frame = make_grid_frame(box, cells, kMarginCells);
+    DistanceGrid grid = make_distance_grid(ellipsoids, frame, threads);
     const bool local = !points.empty();
     if (local) subtract_local_isolevel(points, threads, grid);
     std::optional<CoarseSurface> best;
     Miss best_miss{};
     for (const double offset : local ? kOffsets : kIsolevels) {
         const double level = offset * frame.spacing;
-        common::TriangleMesh mesh = without_debris(
-            common::marching_cubes(frame, grid.values, static_cast<float>(level), threads),
-            promise.components);
+        TriangleMesh mesh =
+            without_debris(marching_cubes(frame, grid.values, static_cast<float>(level), threads),
+                           promise.components);
         if (mesh.triangles.empty()) continue;
-        const Miss here = miss(common::analyse_topology(mesh), promise);
+        const Miss here = miss(analyse_topology(mesh), promise);
         if (!best || here < best_miss) {
             best_miss = here;
             best = CoarseSurface{std::move(mesh), level, frame.spacing, here == Miss{0, 0, 0}};
@@ -234,4 +233,4 @@ std::optional<CoarseSurface> make_coarse_surface(std::span<const common::Ellipso
     return best;
 }
 
-}  // namespace ellicast::receiver
+}  // namespace ellicast::common

@@ -1,5 +1,5 @@
-// tests/receiver/coarse_surface_test.cpp
-#include "receiver/coarse_surface.hpp"
+// tests/common/coarse_surface_test.cpp
+#include "common/coarse_surface.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -8,18 +8,18 @@
 #include "common/mesh_topology.hpp"
 #include "common/random.hpp"
 
-namespace ellicast::receiver {
+namespace ellicast::common {
 namespace {
 
 using Eigen::Vector3d;
 
-common::Ellipsoid sphere(const Vector3d& center, double r) {
+Ellipsoid sphere(const Vector3d& center, double r) {
     return {center, r * Eigen::Matrix3d::Identity()};
 }
 
 // Beads on a ring; `missing` of them left out at the far side.
-std::vector<common::Ellipsoid> ring(int beads, int missing) {
-    std::vector<common::Ellipsoid> result;
+std::vector<Ellipsoid> ring(int beads, int missing) {
+    std::vector<Ellipsoid> result;
     for (int n = 0; n < beads - missing; ++n) {
         const double a = 2.0 * std::numbers::pi * n / beads;
         result.push_back(sphere({0.35 * std::cos(a), 0.35 * std::sin(a), 0}, 0.08));
@@ -36,15 +36,15 @@ TEST_CASE("a single ellipsoid gives a closed sphere") {
         make_coarse_surface(std::vector{sphere({0, 0, 0}, 0.3)}, {}, box(0.4), {}, 64, 1);
     REQUIRE(surface);
     REQUIRE(surface->as_promised);
-    REQUIRE(common::analyse_topology(surface->mesh).closed);
+    REQUIRE(analyse_topology(surface->mesh).closed);
     // The isolevel, a quarter of a cell, adds to the radius.
     REQUIRE(
-        common::signed_volume(surface->mesh) ==
+        signed_volume(surface->mesh) ==
         Approx(4.0 / 3.0 * std::numbers::pi * std::pow(0.3 + surface->isolevel, 3)).epsilon(0.01));
 }
 
 TEST_CASE("an ellipsoid far smaller than a cell still gives a closed surface") {
-    common::Random random(1);
+    Random random(1);
     for (int n = 0; n < 50; ++n) {
         const Vector3d at(random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5);
         const auto surface =
@@ -68,37 +68,36 @@ TEST_CASE("the isolevel that keeps the promise is chosen") {
     const auto broken = make_coarse_surface(ring(24, 6), {}, box(0.45), torus, 64, 1);
     REQUIRE(broken);
     REQUIRE_FALSE(broken->as_promised);
-    REQUIRE(common::analyse_topology(broken->mesh).manifold);
+    REQUIRE(analyse_topology(broken->mesh).manifold);
 }
 
 TEST_CASE("debris beyond the promised components is dropped, a promised one is not") {
-    const std::vector<common::Ellipsoid> pair = {sphere({-0.2, 0, 0}, 0.2),
-                                                 sphere({0.4, 0, 0}, 0.03)};
+    const std::vector<Ellipsoid> pair = {sphere({-0.2, 0, 0}, 0.2), sphere({0.4, 0, 0}, 0.03)};
     const auto one = make_coarse_surface(pair, {}, box(0.45), {1, 2, 2}, 64, 1);
     REQUIRE(one);
     REQUIRE(one->as_promised);
     const auto two = make_coarse_surface(pair, {}, box(0.45), {2, 4, 2}, 64, 1);
     REQUIRE(two);
     REQUIRE(two->as_promised);
-    REQUIRE(common::analyse_topology(two->mesh).components == 2);
+    REQUIRE(analyse_topology(two->mesh).components == 2);
 }
 
 TEST_CASE("points on the walls of a narrow gap keep it open") {
     // Two balls 0.45 cells apart, on both sides of a plane of nodes: even a quarter of a cell on
     // either side joins them.
-    const common::GridFrame frame = common::make_grid_frame(box(0.45), 64, 4);
+    const GridFrame frame = make_grid_frame(box(0.45), 64, 4);
     const double cell = frame.spacing;
     const double plane = frame.position(frame.dims[0] / 2, 0, 0).x();
     const double r = 0.2;
     const Vector3d left(plane - r - 0.225 * cell, 0.003, 0.001);
     const Vector3d right(plane + r + 0.225 * cell, 0.003, 0.001);
-    const std::vector<common::Ellipsoid> balls = {sphere(left, r), sphere(right, r)};
+    const std::vector<Ellipsoid> balls = {sphere(left, r), sphere(right, r)};
     const PromisedTopology promise{2, 4, 2};
     const auto blind = make_coarse_surface(balls, {}, box(0.45), promise, 64, 1);
     REQUIRE(blind);
     REQUIRE_FALSE(blind->as_promised);
     std::vector<Vector3d> points;
-    common::Random random(5);
+    Random random(5);
     while (points.size() < 2000) {
         const Vector3d d(random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5);
         if (d.norm() < 0.1) continue;
@@ -120,4 +119,4 @@ TEST_CASE("the coarse surface is the same on any number of threads") {
 }
 
 }  // namespace
-}  // namespace ellicast::receiver
+}  // namespace ellicast::common
