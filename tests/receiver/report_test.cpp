@@ -59,7 +59,7 @@ struct Run {
 TEST_CASE("the report has the documented keys") {
     const Run run;
     const auto report = make_report(run.content);
-    CHECK(keys(report) == Names{"program", "version", "ends_by", "output", "object", "hint",
+    CHECK(keys(report) == Names{"program", "version", "ends_by", "output", "object", "hint", "record_format",
                                 "datagrams", "ellipsoids", "vertices", "records", "others", "mesh",
                                 "not_inserted", "quality", "seconds"});
     CHECK(keys(report["object"]) == Names{"id", "name", "unit", "complete", "id_verified"});
