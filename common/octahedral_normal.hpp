@@ -8,7 +8,7 @@ namespace ellicast::common {
 
 /// Directions in 8, 12 or 16 bits: the sphere is projected onto an octahedron, its lower half
 /// folded outward, and the square that this gives cut into 2^(bits/2) x 2^(bits/2) cells
-/// ([CDEFM14] section 4). The code is the cell's row times the columns plus its column; it stands
+/// ([C14]). The code is the cell's row times the columns plus its column; it stands
 /// for the direction of the cell's centre, so that no code is wasted.
 
 /// The code whose direction is nearest to `n`, which need not be of unit length; ties go to the

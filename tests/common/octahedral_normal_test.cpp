@@ -47,6 +47,17 @@ TEST_CASE("every code of every size is a direction of its own and comes back") {
     }
 }
 
+TEST_CASE("codes mean what the document says, worked out by hand") {
+    // 8 bits: row and column of four bits each, u = (2 column + 1) / 16 - 1.
+    CHECK(decode_normal(0x87, 8).isApprox(Vector3d(-1, 1, 14).normalized()));
+    CHECK(decode_normal(0x8f, 8).isApprox(Vector3d(15, 1, 0).normalized()));
+    CHECK(decode_normal(0x00, 8).isApprox(Vector3d(-1, -1, -14).normalized()));  // folded
+    CHECK(decode_normal(0x0f, 8).isApprox(Vector3d(1, -1, -14).normalized()));
+    CHECK(decode_normal(0x2e, 8).isApprox(Vector3d(5, -3, -8).normalized()));
+    CHECK(decode_normal(0x83f, 12).isApprox(Vector3d(63, 1, 0).normalized()));
+    CHECK(decode_normal(0xff00, 16).isApprox(Vector3d(-1, 1, -254).normalized()));
+}
+
 TEST_CASE("bits above the size say nothing") {
     CHECK(decode_normal(0xff34, 8) == decode_normal(0x34, 8));
     CHECK(decode_normal(0xf123, 12) == decode_normal(0x123, 12));
