@@ -30,23 +30,6 @@ Vector2d square_of(const Vector3d& n) {
     return n.z() < 0.0 ? fold(p) : p;
 }
 
-struct Cell {
-    int column = 0;
-    int row = 0;
-};
-
-/// The place of a cell beyond an edge of the square: each edge is glued to itself, turned about its
-/// middle.
-Cell wrapped(Cell cell, int cells) {
-    if (cell.column < 0 || cell.column >= cells) {
-        cell = {std::clamp(cell.column, 0, cells - 1), cells - 1 - cell.row};
-    }
-    if (cell.row < 0 || cell.row >= cells) {
-        cell = {cells - 1 - cell.column, std::clamp(cell.row, 0, cells - 1)};
-    }
-    return cell;
-}
-
 }  // namespace
 
 std::uint16_t encode_normal(const Vector3d& n, int bits) {
@@ -56,17 +39,20 @@ std::uint16_t encode_normal(const Vector3d& n, int bits) {
     const Vector3d direction = (n / largest).normalized();
     const int cells = 1 << (bits / 2);
     const Vector2d at = 0.5 * cells * (square_of(direction) + Vector2d::Ones());
-    const Cell home{std::clamp(static_cast<int>(at.x()), 0, cells - 1),
-                    std::clamp(static_cast<int>(at.y()), 0, cells - 1)};
-    // The projection distorts: the nearest centre may be that of a neighbour.
+    const auto home = [&](double x) { return std::clamp(static_cast<int>(x), 0, cells - 1); };
+    // The projection distorts: the nearest centre may be that of a neighbour. None beyond the
+    // square's edge, though, for those are mirror images of cells on this side.
     std::uint16_t best = 0;
     double best_cosine = -2.0;
-    for (int row = home.row - 1; row <= home.row + 1; ++row) {
-        for (int column = home.column - 1; column <= home.column + 1; ++column) {
-            const Cell cell = wrapped({column, row}, cells);
-            const auto code = static_cast<std::uint16_t>(cell.row * cells + cell.column);
+    const auto first = [](int cell) { return std::max(cell - 1, 0); };
+    const auto last = [&](int cell) { return std::min(cell + 1, cells - 1); };
+    const int home_row = home(at.y());
+    const int home_column = home(at.x());
+    for (int row = first(home_row); row <= last(home_row); ++row) {
+        for (int column = first(home_column); column <= last(home_column); ++column) {
+            const auto code = static_cast<std::uint16_t>(row * cells + column);
             const double cosine = direction.dot(decode_normal(code, bits));
-            if (cosine > best_cosine || (cosine == best_cosine && code < best)) {
+            if (cosine > best_cosine) {
                 best = code;
                 best_cosine = cosine;
             }

@@ -11,9 +11,9 @@ namespace ellicast::common {
 /// ([C14]). The code is the cell's row times the columns plus its column; it stands
 /// for the direction of the cell's centre, so that no code is wasted.
 
-/// The code whose direction is nearest to `n`, which need not be of unit length; ties go to the
-/// smaller code. A vector without a direction (zero, not finite) gives 0. Requires bits of 8, 12 or
-/// 16 (asserted).
+/// The code whose direction is nearest to `n`, which need not be of unit length; of equally near
+/// ones one that is fixed but not said. A vector without a direction (zero, not finite) gives 0.
+/// Requires bits of 8, 12 or 16 (asserted).
 std::uint16_t encode_normal(const Eigen::Vector3d& n, int bits);
 
 /// Of unit length, whatever the code; higher bits of it are ignored. Same requirement.

@@ -75,9 +75,7 @@ struct RecordFormat {
     [[nodiscard]] bool is_known() const;
 
     /// Bits of one vertex's normal and ring.
-    [[nodiscard]] std::size_t tag_bits() const {
-        return normal_bits + (ring ? kRingBits : 0);
-    }
+    [[nodiscard]] std::size_t tag_bits() const { return normal_bits + (ring ? kRingBits : 0); }
     /// Bytes that the records of `count` vertices take in one section. Of two sections together it
     /// may be one more than of one with as many vertices.
     [[nodiscard]] std::size_t vertex_bytes(std::size_t count) const {

@@ -167,7 +167,7 @@ TEST_CASE("of records that differ in a tag alone the one with the smaller bytes 
     add_tags(object, {.normal_bits = 16, .ring = true, .colour = true});
     // In the order of the canonical form: normal, ring, red, green, blue; the first one decides.
     const std::vector<protocol::VertexRecord> ascending{
-        {{0, 0, 1}, 0x00ff, 9, {9, 9, 9}},    {{0, 0, 1}, 0x0100, 0x7f, {9, 9, 9}},
+        {{0, 0, 1}, 0x00ff, 0xff, {9, 9, 9}}, {{0, 0, 1}, 0x0100, 0x7f, {9, 9, 9}},
         {{0, 0, 1}, 0x0100, 0x80, {0, 9, 9}}, {{0, 0, 1}, 0x0100, 0x80, {1, 8, 9}},
         {{0, 0, 1}, 0x0100, 0x80, {1, 9, 8}}, {{0, 0, 1}, 0x0100, 0x80, {1, 9, 9}}};
     for (std::size_t a = 0; a < ascending.size(); ++a) {

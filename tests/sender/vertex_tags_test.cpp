@@ -92,6 +92,9 @@ TEST_CASE("a sphere's normals point outward, as exactly as their bits allow") {
 
 TEST_CASE("a mesh inside out, or with some faces turned, has the normals of the solid") {
     common::TriangleMesh mesh = tests::icosphere(2);
+    // So that no normal lies between two codes, where rounding would decide.
+    const Eigen::AngleAxisd turn(1.0, Vector3d(1, 2, 3).normalized());
+    for (Vector3d& p : mesh.positions) p = turn * p;
     const BroadcastObject object = object_of(mesh, {.normal_bits = 12});
     const bool all = GENERATE(true, false);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -178,11 +181,14 @@ TEST_CASE("vertices that become one only when rounded are united as well") {
             first = false;
         }
     }
+    mesh.colours.assign(mesh.positions.size(), {1, 1, 1});
+    mesh.colours.back() = {2, 2, 2};
     const BroadcastObject object = object_of(mesh, {.normal_bits = 16, .ring = true});
     CHECK(object.vertices.size() == mesh.positions.size() - 1);
     for (const protocol::VertexRecord& vertex : object.vertices) {
         const unsigned valence = common::ring_valence(vertex.ring);
         CHECK((valence == 5 || valence == 6));
+        CHECK(vertex.colour == common::Colour{1, 1, 1});  // the first one's
     }
 }
 
