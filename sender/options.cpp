@@ -28,6 +28,7 @@ Examples:
 Exit codes: 0 done, 2 usage or input error.)";
 
 const std::vector<std::string> kCriteria{"volume", "robust"};
+const std::vector<std::string> kOrders{"importance", "spread"};
 const std::vector<std::string> kLogLevels{"trace", "debug", "info", "warn", "error", "off"};
 constexpr const char* kIdentityGroup = "Identity of the stream (random unless given; for tests)";
 
@@ -35,6 +36,7 @@ constexpr const char* kIdentityGroup = "Identity of the stream (random unless gi
 struct Texts {
     std::string to;
     std::string criterion = "robust";
+    std::string order = "importance";
     std::string rate = "20M";
     std::string rounds = "1";
     std::string cache;
@@ -125,6 +127,11 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
         ->type_name("RULE")
         ->check(CLI::IsMember(kCriteria).description(""))
         ->capture_default_str();
+    app.add_option("--order", texts.order,
+                   "Of the vertices: importance (any prefix is a good model), or spread evenly")
+        ->type_name("RULE")
+        ->check(CLI::IsMember(kOrders).description(""))
+        ->capture_default_str();
     add_number<std::uint64_t>(
         app, "--seed", geometry.seed, 0, std::numeric_limits<std::uint64_t>::max(),
         "Of seeds and of the order of vertices; another seed, another object");
@@ -208,6 +215,7 @@ void interpret(const Texts& texts, Options& options) {
     };
     options.decomposition.criterion =
         texts.criterion == "volume" ? Criterion::volume : Criterion::robust;
+    options.order = texts.order == "spread" ? SendingOrder::spread : SendingOrder::importance;
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);

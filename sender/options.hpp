@@ -11,6 +11,7 @@
 
 #include "common/loss_model.hpp"
 #include "protocol/datagram.hpp"
+#include "sender/broadcast_object.hpp"
 #include "sender/decomposition.hpp"
 
 namespace ellicast::sender {
@@ -29,6 +30,7 @@ struct Options {
     std::string host;                           // "" only with decompose_only
     std::uint16_t port = 5004;
     DecompositionOptions decomposition;  // its seed and threads are the program's
+    SendingOrder order = SendingOrder::importance;
     std::size_t copies = 3;
     std::uint64_t bits_per_second = 20'000'000;  // 0: as fast as the socket takes them
     std::uint32_t rounds = 1;                    // 0: forever

@@ -29,6 +29,7 @@ ordered_json object_json(const LoadedModel& model, const RoundPlan& plan) {
     json["object_id"] = hex(object.id);
     json["vertices"] = object.vertices.size();
     json["ellipsoids"] = object.ellipsoids.size();
+    json["order"] = object.order == SendingOrder::spread ? "spread" : "importance";
     json["copies"] = plan.copies();
     json["datagrams"] = plan.datagrams();
     json["origin"] = object.description.origin;

@@ -50,6 +50,7 @@ TEST_CASE("defaults are those of the manual") {
     CHECK(options.decomposition.candidates == 10'000);
     CHECK(options.decomposition.criterion == Criterion::robust);
     CHECK(options.decomposition.seed == 1);
+    CHECK(options.order == SendingOrder::importance);
     CHECK(options.copies == 3);
     CHECK(options.bits_per_second == 20'000'000);
     CHECK(options.rounds == 1);
@@ -73,6 +74,8 @@ TEST_CASE("every flag reaches its option") {
                                       "2",
                                       "--criterion",
                                       "volume",
+                                      "--order",
+                                      "spread",
                                       "--rate",
                                       "1.5M",
                                       "--rounds",
@@ -110,6 +113,7 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.decomposition.ellipsoids == 200);
     CHECK(options.decomposition.candidates == 2500);
     CHECK(options.decomposition.criterion == Criterion::volume);
+    CHECK(options.order == SendingOrder::spread);
     CHECK(options.decomposition.seed == 18'446'744'073'709'551'615u);
     CHECK(options.decomposition.threads == 2);
     CHECK(options.copies == 2);

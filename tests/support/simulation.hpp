@@ -27,7 +27,8 @@ struct SimulatedModel {
 
 /// Reads, prepares, decomposes; throws common::ModelError.
 SimulatedModel load_simulated(const std::filesystem::path& path,
-                              const sender::DecompositionOptions& options = {});
+                              const sender::DecompositionOptions& options = {},
+                              sender::SendingOrder order = sender::SendingOrder::importance);
 
 struct TimedDatagram {
     std::chrono::nanoseconds at{};
