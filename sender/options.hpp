@@ -32,6 +32,7 @@ struct Options {
     DecompositionOptions decomposition;  // its seed and threads are the program's
     SendingOrder order = SendingOrder::importance;
     std::size_t copies = 3;
+    double redundancy = 1.0;  // bytes of a round, in rounds that hold each vertex once
     std::uint64_t bits_per_second = 20'000'000;  // 0: as fast as the socket takes them
     std::uint32_t rounds = 1;                    // 0: forever
     std::size_t datagram_bytes = protocol::kDefaultDatagramBytes;

@@ -46,6 +46,7 @@ std::vector<RoundPlan> make_plans(std::vector<LoadedModel>& models, const Option
     PlanOptions plan_options;
     plan_options.datagram_bytes = options.datagram_bytes;
     plan_options.copies = options.copies;
+    plan_options.redundancy = options.redundancy;
     plan_options.bits_per_second = options.bits_per_second;
     plan_options.rounds = options.rounds;
     plan_options.session = identity.session;

@@ -31,6 +31,7 @@ ordered_json object_json(const LoadedModel& model, const RoundPlan& plan) {
     json["ellipsoids"] = object.ellipsoids.size();
     json["order"] = object.order == SendingOrder::spread ? "spread" : "importance";
     json["copies"] = plan.copies();
+    json["redundancy"] = plan.redundancy();
     json["datagrams"] = plan.datagrams();
     json["origin"] = object.description.origin;
     json["topology"] = {{"components", model.promise.components},

@@ -52,6 +52,7 @@ TEST_CASE("defaults are those of the manual") {
     CHECK(options.decomposition.seed == 1);
     CHECK(options.order == SendingOrder::importance);
     CHECK(options.copies == 3);
+    CHECK(options.redundancy == 1.0);
     CHECK(options.bits_per_second == 20'000'000);
     CHECK(options.rounds == 1);
     CHECK(options.datagram_bytes == 1200);
@@ -74,6 +75,8 @@ TEST_CASE("every flag reaches its option") {
                                       "2",
                                       "--criterion",
                                       "volume",
+                                      "--redundancy",
+                                      "1.75",
                                       "--order",
                                       "spread",
                                       "--rate",
@@ -117,6 +120,7 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.decomposition.seed == 18'446'744'073'709'551'615u);
     CHECK(options.decomposition.threads == 2);
     CHECK(options.copies == 2);
+    CHECK(options.redundancy == 1.75);
     CHECK(options.bits_per_second == 1'500'000);
     CHECK(options.rounds == 0);
     CHECK(options.datagram_bytes == 1400);
@@ -155,6 +159,10 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
         std::vector<const char*>{"a.ply", "--to", "h", "--rate", "fast"},
         std::vector<const char*>{"a.ply", "--to", "h", "--rate", "-1"},
         std::vector<const char*>{"a.ply", "--to", "h", "--rounds", "-1"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--order", "random"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--redundancy", "0.99"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--redundancy", "3.01"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--redundancy", "nan"},
         std::vector<const char*>{"a.ply", "--to", "h", "--rounds", "4294967296"},
         std::vector<const char*>{"a.ply", "--to", "h", "--ellipsoids", "0"},
         std::vector<const char*>{"a.ply", "--to", "h", "--ellipsoids", "65536"},

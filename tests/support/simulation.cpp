@@ -34,6 +34,7 @@ std::vector<TimedDatagram> broadcast(const sender::BroadcastObject& object,
     sender::PlanOptions plan;
     plan.datagram_bytes = options.datagram_bytes;
     plan.copies = options.copies;
+    plan.redundancy = options.redundancy;
     plan.rounds = options.rounds;
     plan.session = kSession;
     sender::SessionOptions how;

@@ -38,6 +38,7 @@ struct TimedDatagram {
 struct BroadcastOptions {
     std::size_t datagram_bytes = 1200;
     std::size_t copies = 3;
+    double redundancy = 1.0;
     std::uint32_t rounds = 1;
     common::ImpairmentOptions impairment;  // at the sender, as by its command line
 };
