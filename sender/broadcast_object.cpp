@@ -12,6 +12,9 @@
 #include "common/object_id.hpp"
 #include "common/random.hpp"
 #include "protocol/object_table.hpp"
+#include "sender/importance_order.hpp"
+#include "sender/spread_order.hpp"
+#include "sender/surface_decimation.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -66,9 +69,8 @@ protocol::EllipsoidRecord ellipsoid_record(const common::Ellipsoid& ellipsoid,
     return record;
 }
 
-/// Keeps the first of all records with equal positions (0 and -0 are equal), order otherwise kept.
-std::vector<protocol::VertexRecord> without_repeats(
-    const std::vector<protocol::VertexRecord>& records) {
+/// Of each record the first that is equal to it (0 and -0 are equal).
+std::vector<std::uint32_t> first_equals(const std::vector<protocol::VertexRecord>& records) {
     std::vector<std::uint32_t> by_position(records.size());
     std::iota(by_position.begin(), by_position.end(), 0u);
     std::sort(by_position.begin(), by_position.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -76,31 +78,76 @@ std::vector<protocol::VertexRecord> without_repeats(
         const auto& q = records[b].position;
         return p != q ? p < q : a < b;
     });
-    std::vector<bool> repeated(records.size(), false);
-    for (std::size_t k = 1; k < by_position.size(); ++k) {
-        repeated[by_position[k]] = records[by_position[k - 1]] == records[by_position[k]];
-    }
-    std::vector<protocol::VertexRecord> kept;
-    kept.reserve(records.size());
+    std::vector<std::uint32_t> first(records.size());
     for (std::size_t k = 0; k < records.size(); ++k) {
-        if (!repeated[k]) kept.push_back(records[k]);
+        const std::uint32_t index = by_position[k];
+        const bool equal = k > 0 && records[by_position[k - 1]] == records[index];
+        first[index] = equal ? first[by_position[k - 1]] : index;
     }
-    return kept;
+    return first;
 }
 
-std::vector<protocol::VertexRecord> in_spread_order(
-    const std::vector<protocol::VertexRecord>& records, std::uint64_t seed) {
+std::vector<Eigen::Vector3d> positions_of(const std::vector<protocol::VertexRecord>& records) {
     std::vector<Eigen::Vector3d> positions;
     positions.reserve(records.size());
     for (const protocol::VertexRecord& record : records) {
         positions.emplace_back(record.position[0], record.position[1], record.position[2]);
     }
-    std::vector<protocol::VertexRecord> ordered;
-    ordered.reserve(records.size());
-    for (const std::uint32_t index : spread_order(positions, seed)) {
-        ordered.push_back(records[index]);
+    return positions;
+}
+
+std::vector<protocol::VertexRecord> picked(const std::vector<protocol::VertexRecord>& records,
+                                           const std::vector<std::uint32_t>& indices) {
+    std::vector<protocol::VertexRecord> result;
+    result.reserve(indices.size());
+    for (const std::uint32_t index : indices) result.push_back(records[index]);
+    return result;
+}
+
+/// The vertices' own indices by descending importance, backwards through the decimation of the
+/// solid. Where the solid has copies of a vertex, the most important one counts.
+std::vector<std::uint32_t> by_importance(const PreparedModel& model,
+                                         const std::vector<std::uint32_t>& first_equal) {
+    std::vector<std::uint32_t> removed = removal_order(model.solid);
+    std::reverse(removed.begin(), removed.end());
+    std::vector<bool> taken(model.vertices.size(), false);
+    std::vector<std::uint32_t> ranking;
+    ranking.reserve(model.vertices.size());
+    for (const std::uint32_t index : removed) {
+        const std::uint32_t vertex = first_equal[index];
+        if (vertex >= taken.size() || taken[vertex]) continue;  // the centre of a cap, or a copy
+        taken[vertex] = true;
+        ranking.push_back(vertex);
     }
-    return ordered;
+    return ranking;
+}
+
+/// The records of the model's vertices, one each, and of the solid's others behind them.
+std::vector<protocol::VertexRecord> solid_records(const PreparedModel& model,
+                                                  const std::array<double, 3>& origin) {
+    std::vector<protocol::VertexRecord> records;
+    records.reserve(model.solid.positions.size());
+    for (const Eigen::Vector3d& x : model.solid.positions) {
+        records.push_back(vertex_record(x, origin));
+    }
+    return records;
+}
+
+/// Equal records of the model's vertices once, in the order asked for.
+std::vector<protocol::VertexRecord> ordered_records(
+    const PreparedModel& model, std::vector<protocol::VertexRecord> records,
+    const ObjectOptions& options) {
+    const std::vector<std::uint32_t> first_equal = first_equals(records);
+    if (options.order == SendingOrder::importance) {
+        records = picked(records, by_importance(model, first_equal));
+        return picked(records, spread_within_strata(positions_of(records), options.seed));
+    }
+    std::vector<std::uint32_t> distinct;
+    for (std::uint32_t k = 0; k < model.vertices.size(); ++k) {
+        if (first_equal[k] == k) distinct.push_back(k);
+    }
+    records = picked(records, distinct);
+    return picked(records, spread_order(positions_of(records), options.seed));
 }
 
 /// The box of the records themselves: rounding happened before, so it holds every one of them
@@ -133,44 +180,6 @@ void check(const BroadcastObject& object) {
     }
 }
 
-/// Spreads the lower 21 bits of x to every third bit.
-std::uint64_t every_third_bit(std::uint64_t x) {
-    x = (x | x << 32) & 0x001f00000000ffffu;
-    x = (x | x << 16) & 0x001f0000ff0000ffu;
-    x = (x | x << 8) & 0x100f00f00f00f00fu;
-    x = (x | x << 4) & 0x10c30c30c30c30c3u;
-    x = (x | x << 2) & 0x1249249249249249u;
-    return x;
-}
-
-/// Indices along a Morton curve through the bounding cube, 2^21 cells an axis; ties by index.
-std::vector<std::uint32_t> morton_order(const std::vector<Eigen::Vector3d>& positions) {
-    const Eigen::AlignedBox3d box = common::bounding_box(positions);
-    const double longest = box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
-    const double scale = longest > 0.0 ? ((1 << 21) - 1) / longest : 0.0;
-    struct Key {
-        std::uint64_t code;
-        std::uint32_t index;
-    };
-    std::vector<Key> keys;
-    keys.reserve(positions.size());
-    for (const Eigen::Vector3d& p : positions) {
-        std::uint64_t code = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const auto cell = static_cast<std::uint64_t>((p[axis] - box.min()[axis]) * scale);
-            code |= every_third_bit(cell) << axis;
-        }
-        keys.push_back({code, static_cast<std::uint32_t>(keys.size())});
-    }
-    std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
-        return a.code != b.code ? a.code < b.code : a.index < b.index;
-    });
-    std::vector<std::uint32_t> order;
-    order.reserve(keys.size());
-    for (const Key& key : keys) order.push_back(key.index);
-    return order;
-}
-
 }  // namespace
 
 BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
@@ -186,10 +195,10 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     }
     const std::array<double, 3>& origin = object.description.origin;
 
-    std::vector<protocol::VertexRecord> records;
-    records.reserve(model.vertices.size());
-    for (const Eigen::Vector3d& x : model.vertices) records.push_back(vertex_record(x, origin));
-    object.vertices = in_spread_order(without_repeats(records), options.seed);
+    std::vector<protocol::VertexRecord> records = solid_records(model, origin);
+    object.vertices = ordered_records(model, records, options);
+    object.order = options.order;
+    records.resize(model.vertices.size());
     object.hint.format = record_format(options.tags, model);
     set_tags(object.hint.format, model, records, object.vertices);
 
@@ -216,41 +225,6 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     object.id =
         protocol::object_id_of<common::Digest>(object.hint, object.ellipsoids, object.vertices);
     return object;
-}
-
-std::vector<std::uint32_t> spread_order(const std::vector<Eigen::Vector3d>& positions,
-                                        std::uint64_t seed) {
-    const std::vector<std::uint32_t> along_curve = morton_order(positions);
-    const std::size_t count = along_curve.size();
-
-    // A binary tree over the ranks: every node halves its range. Which half is visited first is a
-    // coin tossed once per node; that one is the larger of an odd range. The root is node 1, the
-    // half of node n that is visited first (second) is node 2n (2n + 1).
-    common::Random random(seed);
-    std::vector<bool> right_first(std::bit_ceil(count + 1), false);
-    for (std::size_t node = 0; node < right_first.size(); ++node) {
-        right_first[node] = (random.next() >> 63) != 0;
-    }
-
-    // Bit j of the visit's number chooses the half at depth j. So the visits 0..2^d-1, and every
-    // later aligned run of 2^d, enter each of the 2^d ranges of depth d once; and a stride that is
-    // odd keeps that, since it runs through all residues of 2^d.
-    std::vector<std::uint32_t> order(count);
-    for (std::size_t visit = 0; visit < count; ++visit) {
-        std::size_t begin = 0;
-        std::size_t size = count;
-        std::size_t node = 1;
-        for (std::size_t bits = visit; size > 1; bits >>= 1) {
-            const bool second = (bits & 1) != 0;
-            const bool right = second != right_first[node];
-            const std::size_t part = second ? size / 2 : size - size / 2;
-            if (right) begin += size - part;
-            size = part;
-            node = 2 * node + (second ? 1 : 0);
-        }
-        order[visit] = along_curve[begin];
-    }
-    return order;
 }
 
 }  // namespace ellicast::sender

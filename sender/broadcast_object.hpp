@@ -12,6 +12,12 @@
 
 namespace ellicast::sender {
 
+/// What the canonical order of the vertices, and so the order of sending, goes by.
+enum class SendingOrder {
+    importance,  // what a decimation of the surface removes last comes first
+    spread       // every part of the surface alike
+};
+
 /// The records of one model in canonical order: what a record's index counts. Function of its
 /// inputs alone.
 struct BroadcastObject {
@@ -19,30 +25,25 @@ struct BroadcastObject {
     protocol::Hint hint;
     protocol::Description description;
     std::vector<protocol::EllipsoidRecord> ellipsoids;  // order of selection
-    std::vector<protocol::VertexRecord> vertices;       // spatially spread, seeded order
+    std::vector<protocol::VertexRecord> vertices;       // in the order of `order`
+    SendingOrder order = SendingOrder::importance;
 };
 
 struct ObjectOptions {
     std::string name;
     std::uint64_t seed = 1;
     TagOptions tags{};
+    SendingOrder order = SendingOrder::importance;
 };
 
 /// Turns geometry into records: subtracts the origin (zero unless the box lies far from it; chosen
 /// so that float32 input survives bit for bit), rounds to float32, merges vertices that become
-/// equal, orders the vertices, gives them their tags, drops ellipsoids that no receiver would
-/// accept, fills hint, id and description. The hinted box is that of the rounded records. Throws
+/// equal, orders the vertices (removal_order() backwards and spread_within_strata(), or
+/// spread_order()), gives them their tags, drops ellipsoids that no receiver would accept, fills
+/// hint, id and description. The hinted box is that of the rounded records. Throws
 /// std::invalid_argument with a one-line reason when no vertex or no ellipsoid remains, or when
 /// size, counts or topology exceed what the wire can say.
 BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
                             const Decomposition& decomposition, const ObjectOptions& options);
-
-/// Seeded stratified order: the k-th prefix of any length is an even sample of the surface. Ranks
-/// along a Morton curve are visited in bit-reversed order, shuffled inside strata by the seed. Any
-/// 2^d visits that follow each other at an odd stride and begin at a multiple of 2^d strides lie in
-/// 2^d different parts of the curve. Returns a permutation of 0..n-1. Cost: n log n. Requires
-/// finite positions.
-std::vector<std::uint32_t> spread_order(const std::vector<Eigen::Vector3d>& positions,
-                                        std::uint64_t seed);
 
 }  // namespace ellicast::sender

@@ -8,6 +8,7 @@
 #include "common/loss_options.hpp"
 #include "common/number_text.hpp"
 #include "common/text_values.hpp"
+#include "sender/round_plan.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -22,12 +23,17 @@ Examples:
       two models, one after the other; the next start streams at once
   ellicast-send horse.ply --to 127.0.0.1 --drop 0.3 --loss-seed 7 --report sent.json
       lose three datagrams in ten on purpose, after numbering
+  ellicast-send horse.ply --to 192.0.2.7 --redundancy 1.5
+      half as many bytes again, for second copies of the vertices that matter most
+  ellicast-send horse.ply --to 192.0.2.7 --order spread
+      the vertices evenly instead of the most important first
   ellicast-send horse.ply --decompose-only horse.ellipsoids
       compute the ellipsoids and send nothing
 
 Exit codes: 0 done, 2 usage or input error.)";
 
 const std::vector<std::string> kCriteria{"volume", "robust"};
+const std::vector<std::string> kOrders{"importance", "spread"};
 const std::vector<std::string> kLogLevels{"trace", "debug", "info", "warn", "error", "off"};
 constexpr const char* kIdentityGroup = "Identity of the stream (random unless given; for tests)";
 
@@ -37,8 +43,10 @@ struct Texts {
     std::string criterion = "robust";
     std::string tags = "8";
     std::string colour = "on";
+    std::string order = "importance";
     std::string rate = "20M";
     std::string rounds = "1";
+    std::string redundancy = "1.0";
     std::string cache;
     std::string decompose_only;
     std::string report;
@@ -68,6 +76,14 @@ std::uint32_t rounds_of(const std::string& text) {
     const auto rounds = common::number<std::uint32_t>(text);
     if (!rounds) throw common::refusal(text, "is not a number of rounds, nor 'forever'");
     return *rounds;
+}
+
+double redundancy_of(const std::string& text) {
+    const auto redundancy = common::number<double>(text);
+    if (!redundancy || !(*redundancy >= 1.0 && *redundancy <= kMaxRedundancy)) {
+        throw common::refusal(text, "is not a number from 1.0 to 3.0");
+    }
+    return *redundancy;
 }
 
 common::Endpoint destination_of(const std::string& text) {
@@ -151,6 +167,11 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
         ->type_name("on|off")
         ->check(CLI::IsMember(std::vector<std::string>{"on", "off"}).description(""))
         ->capture_default_str();
+    app.add_option("--order", texts.order,
+                   "Of the vertices: importance (any prefix is a good model), or spread evenly")
+        ->type_name("RULE")
+        ->check(CLI::IsMember(kOrders).description(""))
+        ->capture_default_str();
     add_number<std::uint64_t>(
         app, "--seed", geometry.seed, 0, std::numeric_limits<std::uint64_t>::max(),
         "Of seeds and of the order of vertices; another seed, another object");
@@ -179,6 +200,12 @@ void add_stream_options(CLI::App& app, Options& options, Texts& texts) {
         ->capture_default_str();
     add_number<std::size_t>(app, "--copies", options.copies, 1, 64,
                             "Of every ellipsoid in a round; large models get more; 1: just one");
+    app.add_option("--redundancy", texts.redundancy,
+                   "Bytes of a round, 1.0 to 3.0 times those of each vertex once; the rest are "
+                   "second copies, of the first in order first")
+        ->type_name("X")
+        ->check(accepted_by(redundancy_of))
+        ->capture_default_str();
     add_number<std::size_t>(app, "--datagram", options.datagram_bytes, protocol::kMinDatagramBytes,
                             protocol::kMaxDatagramBytes, "UDP payload in bytes, at most");
 }
@@ -236,11 +263,13 @@ void interpret(const Texts& texts, Options& options) {
         texts.criterion == "volume" ? Criterion::volume : Criterion::robust;
     options.tags = tags_of(texts.tags);
     options.tags.colour = texts.colour == "on";
+    options.order = texts.order == "spread" ? SendingOrder::spread : SendingOrder::importance;
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);
     options.bits_per_second = rate_of(texts.rate);
     options.rounds = rounds_of(texts.rounds);
+    options.redundancy = redundancy_of(texts.redundancy);
     if (!texts.session.empty()) options.identity.session = session_of(texts.session);
     if (!texts.to.empty()) {
         const common::Endpoint destination = destination_of(texts.to);

@@ -11,6 +11,7 @@
 
 #include "common/loss_model.hpp"
 #include "protocol/datagram.hpp"
+#include "sender/broadcast_object.hpp"
 #include "sender/decomposition.hpp"
 #include "sender/vertex_tags.hpp"
 
@@ -31,7 +32,9 @@ struct Options {
     std::uint16_t port = 5004;
     TagOptions tags;
     DecompositionOptions decomposition;  // its seed and threads are the program's
+    SendingOrder order = SendingOrder::importance;
     std::size_t copies = 3;
+    double redundancy = 1.0;  // bytes of a round, in rounds that hold each vertex once
     std::uint64_t bits_per_second = 20'000'000;  // 0: as fast as the socket takes them
     std::uint32_t rounds = 1;                    // 0: forever
     std::size_t datagram_bytes = protocol::kDefaultDatagramBytes;

@@ -34,7 +34,8 @@ std::vector<LoadedModel> load_models(const Options& options) {
             options.decompose_only
                 ? decompose_to_file(path, options.decomposition, options.cache,
                                     *options.decompose_only)
-                : load_model(path, options.decomposition, options.cache, options.tags));
+                : load_model(path, options.decomposition, options.cache, options.tags,
+                             options.order));
         log_model(models.back());
     }
     return models;
@@ -46,6 +47,7 @@ std::vector<RoundPlan> make_plans(std::vector<LoadedModel>& models, const Option
     PlanOptions plan_options;
     plan_options.datagram_bytes = options.datagram_bytes;
     plan_options.copies = options.copies;
+    plan_options.redundancy = options.redundancy;
     plan_options.bits_per_second = options.bits_per_second;
     plan_options.rounds = options.rounds;
     plan_options.session = identity.session;

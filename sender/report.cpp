@@ -32,7 +32,9 @@ ordered_json object_json(const LoadedModel& model, const RoundPlan& plan) {
     json["record_format"] = {{"normal_bits", object.hint.format.normal_bits},
                              {"ring", object.hint.format.ring},
                              {"colour", object.hint.format.colour}};
+    json["order"] = object.order == SendingOrder::spread ? "spread" : "importance";
     json["copies"] = plan.copies();
+    json["redundancy"] = plan.redundancy();
     json["datagrams"] = plan.datagrams();
     json["origin"] = object.description.origin;
     json["topology"] = {{"components", model.promise.components},

@@ -33,10 +33,12 @@ double achieved_rate(const SendOutcome& outcome);
 ///   models[]: one object each
 ///     model          path as given
 ///     name           as broadcast
-///     object_id      16 hex digits; this and the next six keys are absent after --decompose-only
+///     object_id      16 hex digits; this and the next eight keys are absent after --decompose-only
 ///     vertices, ellipsoids   distinct records
 ///     record_format  {normal_bits, ring, colour}: what a vertex holds beside its position
+///     order          of the vertices: importance or spread
 ///     copies         of every ellipsoid in a round
+///     redundancy     as asked: bytes of a round, in rounds that hold each vertex once
 ///     datagrams      in a round
 ///     origin         [x, y, z] subtracted before the wire
 ///     topology       {components, euler_all, euler_largest, approximate, reason}

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <numeric>
 
 namespace ellicast::sender {
@@ -18,6 +19,10 @@ constexpr std::uint32_t kSectionEvery = 8;
 // section holds this many: a shape for the late at once, for 3 % of the bytes (301 in 8 datagrams
 // of 1200).
 constexpr std::uint32_t kRidingEllipsoids = 8;
+
+// Positions a vertex, on average and at most, so that a handful of vertices does not have to
+// outweigh many ellipsoids.
+constexpr double kMostOften = 12.0;
 
 std::uint32_t ceil_div(std::uint64_t a, std::uint64_t b) {
     return static_cast<std::uint32_t>((a + b - 1) / b);
@@ -108,6 +113,10 @@ void set_groups(RoundLayout& layout, std::vector<std::uint32_t> groups) {
     layout.groups = std::move(groups);
 }
 
+std::size_t ellipsoid_section(const EllipsoidRun& run) {
+    return kSectionHeaderBytes + run.count * kEllipsoidBytes;
+}
+
 /// Vertices that fit into one datagram beside everything else in it.
 std::uint32_t vertex_room(const LayoutSizes& sizes, const RoundLayout& layout,
                           std::uint32_t ordinal) {
@@ -115,14 +124,15 @@ std::uint32_t vertex_room(const LayoutSizes& sizes, const RoundLayout& layout,
     std::size_t taken = sizes.vertex_sections * (kSectionHeaderBytes + 1) - 1;
     if (sizes.format.tag_bits() % 8 == 0) taken = sizes.vertex_sections * kSectionHeaderBytes;
     if (ordinal % sizes.description_interval == 0) taken += sizes.description;
-    if (const auto run = layout.ellipsoids_at(ordinal, 0)) {
+    if (auto run = layout.ellipsoids_at(ordinal, 0)) {
         // Another rotation may put a class with one more record here.
-        const std::uint32_t most = ceil_div(layout.ellipsoids, run->stride);
-        taken += kSectionHeaderBytes + most * kEllipsoidBytes;
+        run->count = ceil_div(layout.ellipsoids, run->stride);
+        taken += ellipsoid_section(*run);
     }
-    return taken >= sizes.payload
-               ? 0
-               : static_cast<std::uint32_t>(sizes.format.vertices_within(sizes.payload - taken));
+    if (taken >= sizes.payload) return 0;
+    const auto room =
+        static_cast<std::uint32_t>(sizes.format.vertices_within(sizes.payload - taken));
+    return sizes.redundancy > 1.0 ? std::min(room, sizes.vertices) : room;
 }
 
 std::uint64_t room_in_all(const LayoutSizes& sizes, const RoundLayout& layout) {
@@ -131,26 +141,86 @@ std::uint64_t room_in_all(const LayoutSizes& sizes, const RoundLayout& layout) {
     return room;
 }
 
-/// Gives every datagram the share of the vertices that its room is of all room, so that the last
+/// Gives every datagram the share of the positions that its room is of all room, so that the last
 /// one is as full as the others.
-void share_vertices(const LayoutSizes& sizes, RoundLayout& layout) {
+void share_vertices(const LayoutSizes& sizes, std::uint32_t positions, RoundLayout& layout) {
     const std::uint64_t all = room_in_all(sizes, layout);
-    assert(all >= sizes.vertices);
+    assert(all >= positions);
     std::uint64_t room = 0;
     layout.first_vertex.assign(1, 0);
     layout.first_vertex.reserve(layout.datagrams() + std::size_t{1});
     for (std::uint32_t k = 0; k < layout.datagrams(); ++k) {
         room += vertex_room(sizes, layout, k);
-        // Room and vertices are below 2^29 each: the product fits.
-        layout.first_vertex.push_back(static_cast<std::uint32_t>(room * sizes.vertices / all));
+        // Room and positions are below 2^31 each: the product fits.
+        layout.first_vertex.push_back(static_cast<std::uint32_t>(room * positions / all));
     }
 }
 
-/// The next body length to try when `room` is too little.
-std::uint32_t lengthen(const LayoutSizes& sizes, std::uint32_t body, std::uint64_t room) {
-    const std::uint64_t each = sizes.format.vertices_within(sizes.payload - kSectionHeaderBytes);
-    const std::uint64_t missing = sizes.vertices - room;
+/// The next body length to try when `missing` vertices find no room.
+std::uint32_t lengthen(const LayoutSizes& sizes, std::uint32_t body, std::uint64_t missing) {
+    std::uint64_t each = sizes.format.vertices_within(sizes.payload - kSectionHeaderBytes);
+    if (sizes.redundancy > 1.0) each = std::min<std::uint64_t>(each, sizes.vertices);
     return body + static_cast<std::uint32_t>(std::max<std::uint64_t>(1, missing / each));
+}
+
+/// The shortest layout with that many positions for vertices.
+RoundLayout lay_out_positions(const LayoutSizes& sizes, std::uint32_t positions) {
+    RoundLayout layout;
+    layout.ellipsoids = sizes.ellipsoids;
+    layout.head = head_length(sizes);
+    const std::uint64_t fewest = ceil_div(sizes.ellipsoids, section_limits(sizes).full);
+    layout.body = static_cast<std::uint32_t>((sizes.copies - 1) * fewest);
+    for (;;) {
+        std::optional<std::vector<std::uint32_t>> groups =
+            groups_for(sizes, layout.head, layout.body);
+        if (!groups) {
+            ++layout.body;
+            continue;
+        }
+        set_groups(layout, std::move(*groups));
+        const std::uint64_t room = room_in_all(sizes, layout);
+        if (room >= positions) break;
+        layout.body = lengthen(sizes, layout.body, positions - room);
+    }
+    share_vertices(sizes, positions, layout);
+    return layout;
+}
+
+/// UDP payload of a whole round, but for the few headers where a second section of vertices begins.
+std::uint64_t round_bytes(const LayoutSizes& sizes, const RoundLayout& layout) {
+    std::uint64_t bytes = 0;
+    for (std::uint32_t k = 0; k < layout.datagrams(); ++k) {
+        bytes += protocol::kHeaderBytes + protocol::kTrailerBytes;
+        if (k % sizes.description_interval == 0) bytes += sizes.description;
+        if (const auto run = layout.ellipsoids_at(k, 0)) bytes += ellipsoid_section(*run);
+        const std::uint64_t vertices = layout.first_vertex[k + 1] - layout.first_vertex[k];
+        if (vertices > 0) bytes += kSectionHeaderBytes + sizes.format.vertex_bytes(vertices);
+    }
+    return bytes;
+}
+
+/// The layout with copies whose bytes are nearest to `target`. More positions are more bytes, at
+/// first order those of their share of a datagram; a few steps of that lead there.
+RoundLayout lay_out_bytes(const LayoutSizes& sizes, RoundLayout layout, double target) {
+    constexpr int kSteps = 8;
+    RoundLayout best = layout;
+    double best_gap = target - static_cast<double>(round_bytes(sizes, layout));
+    double gap = best_gap;
+    const auto vertex_bytes = static_cast<double>(sizes.format.vertex_bytes(1));
+    for (int step = 0; step < kSteps && std::abs(gap) >= vertex_bytes; ++step) {
+        const double positions = layout.first_vertex.back();
+        const double each = step == 0 ? (target - gap) / positions : vertex_bytes;
+        const double wanted = std::clamp<double>(positions + std::floor(gap / each), sizes.vertices,
+                                                 kMostOften * sizes.vertices);
+        if (wanted == positions) break;
+        layout = lay_out_positions(sizes, static_cast<std::uint32_t>(wanted));
+        gap = target - static_cast<double>(round_bytes(sizes, layout));
+        if (std::abs(gap) < std::abs(best_gap)) {
+            best = layout;
+            best_gap = gap;
+        }
+    }
+    return best;
 }
 
 }  // namespace
@@ -180,25 +250,15 @@ RoundLayout lay_out(const LayoutSizes& sizes) {
     assert(sizes.ellipsoids >= 1 && sizes.vertices >= 1 && sizes.copies >= 1);
     assert(sizes.vertex_sections >= 1 && sizes.description_interval >= 1);
     assert(sizes.payload >= sizes.description + 2 * kSectionHeaderBytes + kEllipsoidBytes);
-    RoundLayout layout;
-    layout.ellipsoids = sizes.ellipsoids;
-    layout.head = head_length(sizes);
-    const std::uint64_t fewest = ceil_div(sizes.ellipsoids, section_limits(sizes).full);
-    layout.body = static_cast<std::uint32_t>((sizes.copies - 1) * fewest);
-    for (;;) {
-        std::optional<std::vector<std::uint32_t>> groups =
-            groups_for(sizes, layout.head, layout.body);
-        if (!groups) {
-            ++layout.body;
-            continue;
-        }
-        set_groups(layout, std::move(*groups));
-        const std::uint64_t room = room_in_all(sizes, layout);
-        if (room >= sizes.vertices) break;
-        layout.body = lengthen(sizes, layout.body, room);
-    }
-    share_vertices(sizes, layout);
-    return layout;
+    assert(sizes.redundancy >= 1.0);
+    LayoutSizes plain = sizes;
+    plain.redundancy = 1.0;
+    RoundLayout layout = lay_out_positions(plain, sizes.vertices);
+    if (sizes.redundancy == 1.0) return layout;
+    LayoutSizes redundant = sizes;
+    ++redundant.vertex_sections;
+    const double target = sizes.redundancy * static_cast<double>(round_bytes(plain, layout));
+    return lay_out_bytes(redundant, std::move(layout), target);
 }
 
 }  // namespace ellicast::sender

@@ -20,6 +20,7 @@ struct LayoutSizes {
     protocol::RecordFormat format;    // of the vertices
     std::size_t copies = 1;           // of every ellipsoid, at least; 1: exactly once
     std::size_t vertex_sections = 1;  // of one datagram: headers to leave room for
+    double redundancy = 1.0;          // bytes of a round, in rounds that hold each vertex once
 };
 
 /// A run of ellipsoid indices first, first + stride, ...
@@ -39,8 +40,9 @@ struct RoundLayout {
     std::uint32_t body = 0;
     std::vector<std::uint32_t>
         groups;  // of each further copy: its section j is the class j mod groups
-    std::vector<std::uint32_t> first_group;   // running sums of groups; groups.size() + 1 values
-    std::vector<std::uint32_t> first_vertex;  // running sums of vertices; datagrams() + 1 values
+    std::vector<std::uint32_t> first_group;  // running sums of groups; groups.size() + 1 values
+    // Running sums of vertices, copies included; datagrams() + 1 values.
+    std::vector<std::uint32_t> first_vertex;
 
     [[nodiscard]] std::uint32_t datagrams() const { return head + body; }
     [[nodiscard]] std::uint32_t sections() const { return first_group.back(); }
@@ -54,10 +56,13 @@ struct RoundLayout {
 /// The shortest round that holds everything, up to a few datagrams, with a section of ellipsoids in
 /// at least every 8th datagram of the body and no datagram empty. Every copy divides the ellipsoids
 /// into another number of classes, without a common divisor as far as that goes, so that two
-/// ellipsoids that are lost together in one copy are not in the next. Requires ellipsoids,
-/// vertices, copies, vertex_sections and description_interval >= 1, and room for a description, an
-/// ellipsoid and a vertex with their section headers in the payload (asserted). Cost: about linear
-/// in the number of datagrams.
+/// ellipsoids that are lost together in one copy are not in the next. A redundancy above 1 adds
+/// positions for copies of vertices (and a section header in each datagram) until the bytes of the
+/// round, within one datagram, are that many times those of the round without, or there are 12
+/// positions a vertex; then no datagram holds more of them than there are vertices. Requires
+/// ellipsoids, vertices, copies, vertex_sections and description_interval >= 1, and room for a
+/// description, an ellipsoid and a vertex with their section headers in the payload (asserted).
+/// Cost: about linear in the number of datagrams.
 RoundLayout lay_out(const LayoutSizes& sizes);
 
 }  // namespace ellicast::sender

@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include "common/random.hpp"
+#include "sender/vertex_walk.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -46,48 +46,6 @@ std::uint32_t description_interval(const PlanOptions& options) {
     return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(datagrams, 1, kDescriptionEvery));
 }
 
-/// Numbers for one round that are the same wherever they are asked for.
-common::Random random_of(const protocol::ObjectId& id, std::uint32_t round) {
-    std::uint64_t seed = round;
-    for (const std::uint8_t byte : id) seed = seed * 257 + byte;
-    return common::Random(seed);
-}
-
-/// The order of vertices in a round as a walk over positions 0 .. vertices-1: class by class modulo
-/// the stride, beginning at position `start` and wrapping around.
-struct VertexOrder {
-    std::uint32_t vertices = 1;
-    std::uint32_t stride = 1;
-    std::uint32_t start = 0;
-
-    [[nodiscard]] std::uint32_t class_begin(std::uint32_t j) const {
-        return j * (vertices / stride) + std::min(j, vertices % stride);
-    }
-    [[nodiscard]] std::uint32_t class_of(std::uint32_t position) const {
-        const std::uint32_t longer = vertices % stride;  // classes with one vertex more
-        const std::uint32_t size = vertices / stride;
-        const std::uint32_t in_longer = longer * (size + 1);
-        return position < in_longer ? position / (size + 1)
-                                    : longer + (position - in_longer) / size;
-    }
-};
-
-VertexOrder vertex_order(const BroadcastObject& object, std::uint32_t round,
-                         std::uint32_t largest_stride) {
-    VertexOrder order;
-    order.vertices = static_cast<std::uint32_t>(object.vertices.size());
-    if (round == 0) return order;
-    common::Random random = random_of(object.id, round);
-    // Odd, so that a datagram stays an even sample: spread_order goes by the binary digits of the
-    // index.
-    order.stride = 1 + 2 * static_cast<std::uint32_t>(random.below((largest_stride + 1) / 2));
-    // At the start of a class: then a datagram meets at most one border between classes.
-    order.start = order.stride == 1
-                      ? static_cast<std::uint32_t>(random.below(order.vertices))
-                      : order.class_begin(static_cast<std::uint32_t>(random.below(order.stride)));
-    return order;
-}
-
 template <class Record>
 std::vector<Record> pick(const std::vector<Record>& records, std::uint32_t first,
                          std::uint32_t stride, std::uint32_t count) {
@@ -103,6 +61,7 @@ RoundPlan::RoundPlan(BroadcastObject object, const PlanOptions& options)
     : object_(std::move(object)), options_(options) {
     assert(options.datagram_bytes >= protocol::kMinDatagramBytes &&
            options.datagram_bytes <= protocol::kMaxDatagramBytes);
+    assert(options.redundancy >= 1.0 && options.redundancy <= kMaxRedundancy);
     assert(!object_.ellipsoids.empty() && !object_.vertices.empty());
     LayoutSizes sizes;
     sizes.payload = options.datagram_bytes - kHeaderBytes - kTrailerBytes;
@@ -115,13 +74,13 @@ RoundPlan::RoundPlan(BroadcastObject object, const PlanOptions& options)
     sizes.format = object_.hint.format;
     sizes.copies = options.copies;
 
-    // In later rounds a datagram may hold the end of one class and the beginning of the next.
+    // In later rounds a datagram may hold the end of one class and the beginning of the next, and
+    // among copies the end of one pass and the beginning of the next.
+    sizes.redundancy = options.redundancy;
     sizes.vertex_sections = options.rounds == 1 ? 1 : 2;
     layout_ = lay_out(sizes);
-    // No class is shorter than a datagram's vertices, so that it holds parts of two at most.
-    const std::size_t most = sizes.format.vertices_within(sizes.payload - kSectionHeaderBytes);
-    largest_stride_ =
-        static_cast<std::uint32_t>(std::max<std::size_t>(1, object_.vertices.size() / most));
+    most_vertices_ = static_cast<std::uint32_t>(
+        sizes.format.vertices_within(sizes.payload - kSectionHeaderBytes));
 }
 
 std::vector<std::uint8_t> RoundPlan::datagram(std::uint32_t round, std::uint32_t ordinal,
@@ -162,22 +121,17 @@ void RoundPlan::add_ellipsoids(protocol::DatagramWriter& writer, std::uint32_t r
 void RoundPlan::add_vertices(protocol::DatagramWriter& writer, std::uint32_t round,
                              std::uint32_t ordinal) const {
     const std::uint32_t begin = layout_.first_vertex[ordinal];
-    std::uint32_t left = layout_.first_vertex[ordinal + 1] - begin;
-    const VertexOrder order = vertex_order(object_, round, largest_stride_);
-    auto position =
-        static_cast<std::uint32_t>((std::uint64_t{begin} + order.start) % order.vertices);
-    while (left > 0) {
-        const std::uint32_t j = order.class_of(position);
-        const std::uint32_t count = std::min(left, order.class_begin(j + 1) - position);
-        const std::uint32_t first = j + (position - order.class_begin(j)) * order.stride;
-        if (order.stride == 1) {
-            writer.add_vertices(first, 1, std::span(object_.vertices).subspan(first, count));
+    const std::uint32_t count = layout_.first_vertex[ordinal + 1] - begin;
+    const WalkSizes sizes{static_cast<std::uint32_t>(object_.vertices.size()),
+                          layout_.first_vertex.back(), most_vertices_};
+    for (const VertexRun& run : VertexWalk(sizes, object_.id, round).runs(begin, count)) {
+        if (run.stride == 1) {
+            writer.add_vertices(run.first, 1,
+                                std::span(object_.vertices).subspan(run.first, run.count));
         } else {
-            writer.add_vertices(first, order.stride,
-                                pick(object_.vertices, first, order.stride, count));
+            writer.add_vertices(run.first, run.stride,
+                                pick(object_.vertices, run.first, run.stride, run.count));
         }
-        left -= count;
-        position = (position + count) % order.vertices;
     }
 }
 

@@ -11,11 +11,16 @@
 
 namespace ellicast::sender {
 
+inline constexpr double kMaxRedundancy = 3.0;
+
 struct PlanOptions {
     std::size_t datagram_bytes = protocol::kDefaultDatagramBytes;  // UDP payload, all included
     /// Times that every ellipsoid is in a round, at least: on large models there are more, so that
     /// no 8 datagrams in a row are without any. 1 means exactly once, at the start.
     std::size_t copies = 3;
+    /// Bytes of a round, as a multiple of what it has when every vertex is in it just once. The
+    /// rest are copies of vertices, the first indices first. 1 to kMaxRedundancy.
+    double redundancy = 1.0;
     std::uint64_t bits_per_second = 20'000'000;  // spaces the descriptions; 0: unpaced
     std::uint32_t rounds = 1;                    // said in every header; 0: forever
     protocol::SessionId session{};
@@ -29,7 +34,8 @@ struct Stamp {
 };
 
 /// Lays the rounds of one object out (DESIGN section 5) and makes any datagram of any round on
-/// demand. Every round holds each vertex exactly once and each ellipsoid exactly copies() times:
+/// demand. Every round holds each vertex once, or more often when it is redundant, and each
+/// ellipsoid exactly copies() times:
 /// - first the description and one copy of all ellipsoids, as residue classes of their ranks, so
 /// that every
 ///   datagram is an even sample of the ranking; what room is left holds vertices;
@@ -38,7 +44,7 @@ struct Stamp {
 ///   ellipsoids into another number of classes, so that they are lost in other company;
 /// - the description again at least every 64 datagrams and, at the given rate, every 200 ms.
 /// Vertices go in index order in round 0; later rounds take another odd stride and start (see
-/// spread_order for why odd), and rotate the sections of ellipsoids.
+/// VertexWalk, also for copies), and rotate the sections of ellipsoids.
 /// Memory: the object and 4 bytes a datagram.
 class RoundPlan {
   public:
@@ -55,6 +61,7 @@ class RoundPlan {
 
     /// Datagrams in each round.
     [[nodiscard]] std::uint32_t datagrams() const { return layout_.datagrams(); }
+    [[nodiscard]] double redundancy() const { return options_.redundancy; }
     [[nodiscard]] std::uint32_t rounds() const { return options_.rounds; }
     /// Datagram `ordinal` of `round`, at most datagram_bytes, complete with checksum. A function of
     /// the object, the options and the arguments alone. Requires ordinal < datagrams(round)
@@ -71,7 +78,7 @@ class RoundPlan {
     BroadcastObject object_;
     PlanOptions options_;
     std::uint32_t description_interval_ = 1;
-    std::uint32_t largest_stride_ = 1;
+    std::uint32_t most_vertices_ = 1;  // in a datagram
     RoundLayout layout_;
 };
 

@@ -11,6 +11,7 @@
 
 #include "common/object_id.hpp"
 #include "protocol/object_table.hpp"
+#include "sender/spread_order.hpp"
 #include "tests/sender/made_objects.hpp"
 
 namespace ellicast::sender {

@@ -53,7 +53,9 @@ TEST_CASE("defaults are those of the manual") {
     CHECK(options.tags.normal_bits == 8);
     CHECK_FALSE(options.tags.ring);
     CHECK(options.tags.colour);
+    CHECK(options.order == SendingOrder::importance);
     CHECK(options.copies == 3);
+    CHECK(options.redundancy == 1.0);
     CHECK(options.bits_per_second == 20'000'000);
     CHECK(options.rounds == 1);
     CHECK(options.datagram_bytes == 1200);
@@ -76,6 +78,10 @@ TEST_CASE("every flag reaches its option") {
                                       "2",
                                       "--criterion",
                                       "volume",
+                                      "--redundancy",
+                                      "1.75",
+                                      "--order",
+                                      "spread",
                                       "--rate",
                                       "1.5M",
                                       "--rounds",
@@ -113,9 +119,11 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.decomposition.ellipsoids == 200);
     CHECK(options.decomposition.candidates == 2500);
     CHECK(options.decomposition.criterion == Criterion::volume);
+    CHECK(options.order == SendingOrder::spread);
     CHECK(options.decomposition.seed == 18'446'744'073'709'551'615u);
     CHECK(options.decomposition.threads == 2);
     CHECK(options.copies == 2);
+    CHECK(options.redundancy == 1.75);
     CHECK(options.bits_per_second == 1'500'000);
     CHECK(options.rounds == 0);
     CHECK(options.datagram_bytes == 1400);
@@ -169,6 +177,10 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
         std::vector<const char*>{"a.ply", "--to", "h", "--rate", "fast"},
         std::vector<const char*>{"a.ply", "--to", "h", "--rate", "-1"},
         std::vector<const char*>{"a.ply", "--to", "h", "--rounds", "-1"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--order", "random"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--redundancy", "0.99"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--redundancy", "3.01"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--redundancy", "nan"},
         std::vector<const char*>{"a.ply", "--to", "h", "--rounds", "4294967296"},
         std::vector<const char*>{"a.ply", "--to", "h", "--ellipsoids", "0"},
         std::vector<const char*>{"a.ply", "--to", "h", "--ellipsoids", "65536"},

@@ -93,7 +93,11 @@ void check_round(const RoundPlan& plan, const PlanOptions& options, std::uint32_
                            [value](std::size_t count) { return count == value; });
     };
     REQUIRE(all_are(ellipsoids, plan.copies()));
-    REQUIRE(all_are(vertices, 1));
+    if (options.redundancy == 1.0) {
+        REQUIRE(all_are(vertices, 1));
+    } else {
+        REQUIRE(std::count(vertices.begin(), vertices.end(), 0u) == 0);
+    }
     REQUIRE(plan.copies() >= options.copies);
     if (options.copies == 1) REQUIRE(plan.copies() == 1);
 }
@@ -288,6 +292,114 @@ TEST_CASE("a datagram is a function of object, options, round and ordinal, and c
     CHECK(stamped == bytes);
 }
 
+TEST_CASE("a redundant round has the bytes asked for, within a datagram, and breaks no promise") {
+    const std::uint64_t seed = GENERATE(range<std::uint64_t>(1, 31));
+    common::Random random(seed);
+    PlanOptions options;
+    options.rounds = random.chance(0.5) ? 1 : 3;
+    options.datagram_bytes = 576 + random.below(2000);
+    options.copies = 1 + random.below(4);
+    const std::size_t ellipsoids = 1 + random.below(500);
+    const std::size_t vertices = 2000 + random.below(20'000);
+    CAPTURE(seed, options.rounds, options.datagram_bytes, options.copies, ellipsoids, vertices);
+    const BroadcastObject object = made_object(ellipsoids, vertices, seed);
+    const auto bytes_of = [](const RoundPlan& plan) {
+        std::size_t bytes = 0;
+        for (std::uint32_t k = 0; k < plan.datagrams(); ++k) {
+            bytes += plan.datagram(0, k, {}).size();
+        }
+        return static_cast<double>(bytes);
+    };
+    const double plain = bytes_of(RoundPlan(object, options));
+    options.redundancy = 1.0 + 2.0 * random.uniform();
+    const RoundPlan plan(object, options);
+    CAPTURE(options.redundancy, plain);
+    CHECK(std::abs(bytes_of(plan) - options.redundancy * plain) <=
+          static_cast<double>(options.datagram_bytes));
+    for (std::uint32_t round = 0; round < options.rounds; ++round) {
+        check_round(plan, options, round);
+    }
+}
+
+TEST_CASE("copies follow in breadth before depth: three quarters, one quarter, all") {
+    PlanOptions options;
+    options.redundancy = GENERATE(1.1, 1.2, 1.5, 1.8, 2.0, 2.3, 2.7, 3.0);
+    CAPTURE(options.redundancy);
+    const std::size_t count = 8000;
+    const RoundPlan plan(made_object(10, count), options);
+    std::vector<std::uint32_t> sent;
+    for (const ReadDatagram& datagram : read_round(plan, 0)) {
+        sent.insert(sent.end(), datagram.vertices.begin(), datagram.vertices.end());
+    }
+    std::vector<std::uint32_t> wanted;
+    for (const std::size_t pass : {count, 3 * count / 4, count / 4, count}) {
+        for (std::uint32_t k = 0; k < pass; ++k) wanted.push_back(k);
+    }
+    wanted.resize(std::min(wanted.size(), sent.size()));
+    sent.resize(wanted.size());  // the little that ellipsoids do not take of their share
+    CHECK(sent == wanted);
+    CHECK(static_cast<double>(sent.size()) >
+          0.95 * options.redundancy * static_cast<double>(count));
+}
+
+TEST_CASE("a copy is never with its original, and far from it in every round") {
+    PlanOptions options;
+    options.rounds = 0;
+    options.redundancy = GENERATE(1.05, 1.2, 1.75, 2.0, 3.0);
+    const std::size_t count = GENERATE(2u, 50u, 91u, 92u, 400u, 3000u, 20'000u);
+    CAPTURE(options.redundancy, count);
+    const RoundPlan plan(made_object(5, count), options);
+    for (std::uint32_t round = 0; round < 8; ++round) {
+        const std::vector<ReadDatagram> datagrams = read_round(plan, round);
+        std::vector<std::size_t> last(count, datagrams.size());
+        std::vector<std::size_t> copies(count, 0);
+        std::size_t nearest = datagrams.size();
+        for (std::size_t k = 0; k < datagrams.size(); ++k) {
+            REQUIRE(datagrams[k].bytes <= options.datagram_bytes);
+            for (const std::uint32_t index : datagrams[k].vertices) {
+                ++copies[index];
+                if (last[index] < datagrams.size()) nearest = std::min(nearest, k - last[index]);
+                last[index] = k;
+            }
+        }
+        // Stopping anywhere is good: no vertex is there more often than one before it, but for
+        // the one pass that comes again before others have come twice.
+        for (std::size_t k = 1; k < count; ++k) REQUIRE(copies[k] <= copies[k - 1]);
+        CAPTURE(round, nearest, datagrams.size());
+        REQUIRE(nearest >= 1);
+        // Of the vertices' datagrams a fifth; three quarters where no pass comes the second time.
+        const double pass = static_cast<double>(datagrams.size()) / options.redundancy;
+        if (count == 20'000 && options.redundancy >= 1.2)
+            REQUIRE(static_cast<double>(nearest) > 0.2 * pass);
+        if (count == 20'000 && options.redundancy == 1.75)
+            REQUIRE(static_cast<double>(nearest) > 0.7 * pass);
+    }
+}
+
+TEST_CASE("later rounds of a redundant plan copy the same vertices in other company") {
+    PlanOptions options;
+    options.rounds = 0;
+    options.redundancy = 1.5;
+    const RoundPlan plan(made_object(10, 20'000), options);
+    std::set<std::vector<std::uint32_t>> last_datagrams;
+    std::set<std::vector<std::uint32_t>> sent_often;
+    for (std::uint32_t round = 0; round < 4; ++round) {
+        const std::vector<ReadDatagram> datagrams = read_round(plan, round);
+        last_datagrams.insert(datagrams.back().vertices);
+        std::map<std::uint32_t, std::size_t> counts;
+        for (const ReadDatagram& datagram : datagrams) {
+            for (const std::uint32_t index : datagram.vertices) ++counts[index];
+        }
+        std::vector<std::uint32_t> often;
+        for (const auto& [index, times] : counts) {
+            if (times > 1) often.push_back(index);
+        }
+        sent_often.insert(often);
+    }
+    CHECK(last_datagrams.size() == 4);
+    CHECK(sent_often.size() == 1);
+}
+
 TEST_CASE("laying out 2^28 vertices takes memory for datagrams, not for vertices") {
     LayoutSizes sizes;
     sizes.payload = 1200 - 93;
@@ -299,6 +411,8 @@ TEST_CASE("laying out 2^28 vertices takes memory for datagrams, not for vertices
     const RoundLayout layout = lay_out(sizes);
     CHECK(layout.first_vertex.back() == sizes.vertices);
     CHECK(layout.datagrams() < 1.06 * static_cast<double>(1u << 28) / 91.0);
+    sizes.redundancy = 3.0;
+    CHECK(lay_out(sizes).first_vertex.back() > 2.9 * static_cast<double>(sizes.vertices));
 }
 
 }  // namespace ellicast::sender

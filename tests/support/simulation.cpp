@@ -25,8 +25,8 @@ constexpr std::uint16_t kFirstSequence = 65'000;  // so that long streams wrap a
 
 SimulatedModel load_simulated(const std::filesystem::path& path,
                               const sender::DecompositionOptions& options,
-                              const sender::TagOptions& tags) {
-    return {common::read_model(path), sender::load_model(path, options, std::nullopt, tags)};
+                              const sender::TagOptions& tags, sender::SendingOrder order) {
+    return {common::read_model(path), sender::load_model(path, options, std::nullopt, tags, order)};
 }
 
 std::vector<TimedDatagram> broadcast(const sender::BroadcastObject& object,
@@ -34,6 +34,7 @@ std::vector<TimedDatagram> broadcast(const sender::BroadcastObject& object,
     sender::PlanOptions plan;
     plan.datagram_bytes = options.datagram_bytes;
     plan.copies = options.copies;
+    plan.redundancy = options.redundancy;
     plan.rounds = options.rounds;
     plan.session = kSession;
     sender::SessionOptions how;

@@ -28,7 +28,8 @@ struct SimulatedModel {
 /// Reads, prepares, decomposes; throws common::ModelError. Tags are those of the program's default.
 SimulatedModel load_simulated(const std::filesystem::path& path,
                               const sender::DecompositionOptions& options = {},
-                              const sender::TagOptions& tags = {});
+                              const sender::TagOptions& tags = {},
+                              sender::SendingOrder order = sender::SendingOrder::importance);
 
 struct TimedDatagram {
     std::chrono::nanoseconds at{};
@@ -38,6 +39,7 @@ struct TimedDatagram {
 struct BroadcastOptions {
     std::size_t datagram_bytes = 1200;
     std::size_t copies = 3;
+    double redundancy = 1.0;
     std::uint32_t rounds = 1;
     common::ImpairmentOptions impairment;  // at the sender, as by its command line
 };
