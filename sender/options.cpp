@@ -35,6 +35,8 @@ constexpr const char* kIdentityGroup = "Identity of the stream (random unless gi
 struct Texts {
     std::string to;
     std::string criterion = "robust";
+    std::string design_loss = "0.3";
+    std::string refine = "20";
     std::string rate = "20M";
     std::string rounds = "1";
     std::string cache;
@@ -59,6 +61,24 @@ common::Endpoint destination_of(const std::string& text) {
     if (destination.host.empty()) throw common::refusal(text, "has no host");
     if (destination.port == 0) throw common::refusal(text, "nobody can be reached on port 0");
     return destination;
+}
+
+int refinement_of(const std::string& text) {
+    constexpr int kMostRounds = 1000;
+    if (text == "off") return 0;
+    const auto rounds = common::number<int>(text);
+    if (!rounds || *rounds < 0 || *rounds > kMostRounds) {
+        throw common::refusal(text, "is not a number of rounds from 0 to 1000, nor 'off'");
+    }
+    return *rounds;
+}
+
+double design_loss_of(const std::string& text) {
+    const auto loss = common::number<double>(text);
+    if (!loss || !(*loss >= 0.0 && *loss <= 0.95)) {
+        throw common::refusal(text, "is not a loss from 0 to 0.95");
+    }
+    return *loss;
 }
 
 protocol::SessionId session_of(const std::string& text) {
@@ -124,6 +144,16 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
                    "How to select them: volume, or robust against loss")
         ->type_name("RULE")
         ->check(CLI::IsMember(kCriteria).description(""))
+        ->capture_default_str();
+    app.add_option("--design-loss", texts.design_loss,
+                   "Share of the ellipsoids whose loss 'robust' reckons with")
+        ->type_name("P")
+        ->check(accepted_by(design_loss_of))
+        ->capture_default_str();
+    app.add_option("--refine", texts.refine,
+                   "Rounds of fitting the selected to the surface, or off: as they grew")
+        ->type_name("ROUNDS")
+        ->check(accepted_by(refinement_of))
         ->capture_default_str();
     add_number<std::uint64_t>(
         app, "--seed", geometry.seed, 0, std::numeric_limits<std::uint64_t>::max(),
@@ -208,6 +238,8 @@ void interpret(const Texts& texts, Options& options) {
     };
     options.decomposition.criterion =
         texts.criterion == "volume" ? Criterion::volume : Criterion::robust;
+    options.decomposition.expected_loss = design_loss_of(texts.design_loss);
+    options.decomposition.refine = refinement_of(texts.refine);
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);

@@ -49,6 +49,8 @@ TEST_CASE("defaults are those of the manual") {
     CHECK(options.decomposition.ellipsoids == 400);
     CHECK(options.decomposition.candidates == 10'000);
     CHECK(options.decomposition.criterion == Criterion::robust);
+    CHECK(options.decomposition.expected_loss == 0.3);
+    CHECK(options.decomposition.refine == 20);
     CHECK(options.decomposition.seed == 1);
     CHECK(options.copies == 3);
     CHECK(options.bits_per_second == 20'000'000);
@@ -71,6 +73,10 @@ TEST_CASE("every flag reaches its option") {
                                       "2500",
                                       "--copies",
                                       "2",
+                                      "--design-loss",
+                                      "0.4",
+                                      "--refine",
+                                      "7",
                                       "--criterion",
                                       "volume",
                                       "--rate",
@@ -109,6 +115,8 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.port == 6000);
     CHECK(options.decomposition.ellipsoids == 200);
     CHECK(options.decomposition.candidates == 2500);
+    CHECK(options.decomposition.expected_loss == 0.4);
+    CHECK(options.decomposition.refine == 7);
     CHECK(options.decomposition.criterion == Criterion::volume);
     CHECK(options.decomposition.seed == 18'446'744'073'709'551'615u);
     CHECK(options.decomposition.threads == 2);
@@ -128,6 +136,10 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.identity.ssrc == 4'294'967'295u);
     CHECK(options.identity.first_sequence == 65'535);
     CHECK(options.identity.first_timestamp == 0u);
+}
+
+TEST_CASE("refinement can be switched off") {
+    CHECK(accepted({"a.ply", "--to", "h", "--refine", "off"}).decomposition.refine == 0);
 }
 
 TEST_CASE("a rate of 0 means unpaced, and 0 rounds mean forever") {
@@ -158,6 +170,8 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
         std::vector<const char*>{"a.ply", "--to", "h", "--candidates", "0"},
         std::vector<const char*>{"a.ply", "--to", "h", "--copies", "0"},
         std::vector<const char*>{"a.ply", "--to", "h", "--copies", "65"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--design-loss", "1"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--refine", "on"},
         std::vector<const char*>{"a.ply", "--to", "h", "--criterion", "beauty"},
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "575"},
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "65508"},
@@ -195,12 +209,13 @@ TEST_CASE("help shows every flag with examples, version the version; both end wi
     const Parsed help = parse({"--help"});
     REQUIRE(std::holds_alternative<int>(help.result));
     CHECK(std::get<int>(help.result) == 0);
-    for (const char* text : {"MODEL",           "--to",        "--ellipsoids", "--candidates",
-                             "--copies",        "--criterion", "--rate",       "--rounds",
-                             "--datagram",      "--seed",      "--cache",      "--decompose-only",
-                             "--report",        "--log-level", "--quiet",      "--config",
-                             "--version",       "--threads",   "--drop",       "--drop-ellipsoids",
-                             "--drop-vertices", "--loss",      "Examples:",    "Exit codes"}) {
+    for (const char* text : {"--refine",     "--design-loss",     "MODEL",           "--to",
+                             "--ellipsoids", "--candidates",      "--copies",        "--criterion",
+                             "--rate",       "--rounds",          "--datagram",      "--seed",
+                             "--cache",      "--decompose-only",  "--report",        "--log-level",
+                             "--quiet",      "--config",          "--version",       "--threads",
+                             "--drop",       "--drop-ellipsoids", "--drop-vertices", "--loss",
+                             "Examples:",    "Exit codes"}) {
         CHECK_THAT(help.out, Catch::Contains(text));
     }
     CHECK(help.err.empty());
