@@ -37,6 +37,7 @@ struct Texts {
     std::string criterion = "robust";
     std::string design_loss = "0.3";
     std::string refine = "20";
+    std::string certify;
     std::string rate = "20M";
     std::string rounds = "1";
     std::string cache;
@@ -71,6 +72,21 @@ int refinement_of(const std::string& text) {
         throw common::refusal(text, "is not a number of rounds from 0 to 1000, nor 'off'");
     }
     return *rounds;
+}
+
+/// "0.5:0.95" is a loss of 0.5 and a share of 0.95.
+CertificateGoal goal_of(const std::string& text) {
+    const std::size_t colon = text.find(':');
+    const auto loss = common::number<double>(text.substr(0, colon));
+    const auto share =
+        common::number<double>(colon == std::string::npos ? "" : text.substr(colon + 1));
+    if (!loss || !(*loss >= 0.0 && *loss < 1.0)) {
+        throw common::refusal(text, "is not LOSS:SHARE with a loss from 0 to below 1");
+    }
+    if (!share || !(*share >= 0.01 && *share <= 0.999)) {
+        throw common::refusal(text, "is not LOSS:SHARE with a share from 0.01 to 0.999");
+    }
+    return {*loss, *share};
 }
 
 double design_loss_of(const std::string& text) {
@@ -160,6 +176,12 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
         "Of seeds and of the order of vertices; another seed, another object");
     add_number<unsigned>(app, "--threads", geometry.threads, 0, 1024,
                          "Threads for geometry; 0: one per core");
+    app.add_option(
+           "--certify", texts.certify,
+           "Have at least SHARE of the receivers see the right topology after losing LOSS of "
+           "the datagrams: try it, and add copies or ellipsoids until they do")
+        ->type_name("LOSS:SHARE")
+        ->check(accepted_by(goal_of));
     app.add_option("--cache", texts.cache, "Keep decompositions here, and take them from here")
         ->type_name("DIR");
     app.add_option("--decompose-only", texts.decompose_only,
@@ -240,6 +262,7 @@ void interpret(const Texts& texts, Options& options) {
         texts.criterion == "volume" ? Criterion::volume : Criterion::robust;
     options.decomposition.expected_loss = design_loss_of(texts.design_loss);
     options.decomposition.refine = refinement_of(texts.refine);
+    if (!texts.certify.empty()) options.certify = goal_of(texts.certify);
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);

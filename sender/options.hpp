@@ -12,6 +12,7 @@
 #include "common/loss_model.hpp"
 #include "protocol/datagram.hpp"
 #include "sender/decomposition.hpp"
+#include "sender/topology_certificate.hpp"
 
 namespace ellicast::sender {
 
@@ -30,6 +31,7 @@ struct Options {
     std::uint16_t port = 5004;
     DecompositionOptions decomposition;  // its seed and threads are the program's
     std::size_t copies = 3;
+    std::optional<CertificateGoal> certify;
     std::uint64_t bits_per_second = 20'000'000;  // 0: as fast as the socket takes them
     std::uint32_t rounds = 1;                    // 0: forever
     std::size_t datagram_bytes = protocol::kDefaultDatagramBytes;

@@ -50,6 +50,7 @@ TEST_CASE("defaults are those of the manual") {
     CHECK(options.decomposition.candidates == 10'000);
     CHECK(options.decomposition.criterion == Criterion::robust);
     CHECK(options.decomposition.expected_loss == 0.3);
+    CHECK_FALSE(options.certify);
     CHECK(options.decomposition.refine == 20);
     CHECK(options.decomposition.seed == 1);
     CHECK(options.copies == 3);
@@ -73,6 +74,8 @@ TEST_CASE("every flag reaches its option") {
                                       "2500",
                                       "--copies",
                                       "2",
+                                      "--certify",
+                                      "0.6:0.99",
                                       "--design-loss",
                                       "0.4",
                                       "--refine",
@@ -116,6 +119,7 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.decomposition.ellipsoids == 200);
     CHECK(options.decomposition.candidates == 2500);
     CHECK(options.decomposition.expected_loss == 0.4);
+    CHECK(options.certify == CertificateGoal{0.6, 0.99});
     CHECK(options.decomposition.refine == 7);
     CHECK(options.decomposition.criterion == Criterion::volume);
     CHECK(options.decomposition.seed == 18'446'744'073'709'551'615u);
@@ -172,6 +176,10 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
         std::vector<const char*>{"a.ply", "--to", "h", "--copies", "65"},
         std::vector<const char*>{"a.ply", "--to", "h", "--design-loss", "1"},
         std::vector<const char*>{"a.ply", "--to", "h", "--refine", "on"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "0.5"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "1:0.95"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "0.5:1"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "0.5:nan"},
         std::vector<const char*>{"a.ply", "--to", "h", "--criterion", "beauty"},
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "575"},
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "65508"},
@@ -209,13 +217,13 @@ TEST_CASE("help shows every flag with examples, version the version; both end wi
     const Parsed help = parse({"--help"});
     REQUIRE(std::holds_alternative<int>(help.result));
     CHECK(std::get<int>(help.result) == 0);
-    for (const char* text : {"--refine",     "--design-loss",     "MODEL",           "--to",
-                             "--ellipsoids", "--candidates",      "--copies",        "--criterion",
-                             "--rate",       "--rounds",          "--datagram",      "--seed",
-                             "--cache",      "--decompose-only",  "--report",        "--log-level",
-                             "--quiet",      "--config",          "--version",       "--threads",
-                             "--drop",       "--drop-ellipsoids", "--drop-vertices", "--loss",
-                             "Examples:",    "Exit codes"}) {
+    for (const char* text : {"--certify",   "--refine",     "--design-loss",     "MODEL",
+                             "--to",        "--ellipsoids", "--candidates",      "--copies",
+                             "--criterion", "--rate",       "--rounds",          "--datagram",
+                             "--seed",      "--cache",      "--decompose-only",  "--report",
+                             "--log-level", "--quiet",      "--config",          "--version",
+                             "--threads",   "--drop",       "--drop-ellipsoids", "--drop-vertices",
+                             "--loss",      "Examples:",    "Exit codes"}) {
         CHECK_THAT(help.out, Catch::Contains(text));
     }
     CHECK(help.err.empty());
