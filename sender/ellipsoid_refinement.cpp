@@ -167,8 +167,11 @@ class Shell {
     std::array<Row, 3> box_;
 };
 
-// Nodes within kBand cells of some triangle's box.
+// Nodes within kBand cells of some triangle's box; all of them once that is found out faster by
+// asking, as with a million needles across the whole model.
 std::vector<std::uint8_t> nodes_near(const common::TriangleMesh& solid, const GridFrame& frame) {
+    constexpr std::ptrdiff_t kMostRows = 1 << 24;
+    std::ptrdiff_t rows = 0;
     std::vector<std::uint8_t> near(frame.size(), 0);
     for (const common::Triangle& triangle : solid.triangles) {
         Eigen::AlignedBox3d box;
@@ -177,6 +180,9 @@ std::vector<std::uint8_t> nodes_near(const common::TriangleMesh& solid, const Gr
         }
         const Eigen::Vector3i low = box.min().array().floor().cast<int>().matrix();
         const Eigen::Vector3i high = box.max().array().ceil().cast<int>().matrix();
+        const Eigen::Vector3i extent = high - low + Eigen::Vector3i::Constant(2 * kBand - 1);
+        rows += std::ptrdiff_t{extent[1]} * extent[2];
+        if (rows > kMostRows) return std::vector<std::uint8_t>(frame.size(), 1);
         for (int k = low[2] - kBand + 1; k < high[2] + kBand; ++k) {
             for (int j = low[1] - kBand + 1; j < high[1] + kBand; ++j) {
                 std::uint8_t* row = near.data() + frame.index(0, j, k);
