@@ -25,6 +25,14 @@ constexpr std::array<double, 5> kIsolevels = {0.25, 0.5, 0.75, 1.0, 1.5};
 // With points, on top of the local isolevel.
 constexpr std::array<double, 5> kOffsets = {0.0, 0.25, -0.25, 0.5, 1.0};
 
+// Shares of the binomial filter, in the order in which they are tried at each isolevel: ellipsoids
+// that fit snugly leave pits and tunnels of a cell's size between them, which smoothing closes.
+// Alone the sharpest field shows the volume best. Under received points a pit is worse than a
+// rounded edge, for they restore the edge but not what fell into the pit (fertility at half the
+// datagrams lost: rms 5.3e-4 instead of 11e-4).
+constexpr std::array<float, 3> kSharpFirst = {0.0F, 0.125F, 0.25F};
+constexpr std::array<float, 3> kSmoothFirst = {0.125F, 0.25F, 0.0F};
+
 // A surplus component below this share of the whole volume is debris: a bubble between ellipsoids,
 // or one ellipsoid cut off by the loss of its neighbours.
 constexpr double kDebrisShare = 0.01;
@@ -204,6 +212,32 @@ void subtract_local_isolevel(std::span<const Eigen::Vector3d> points, unsigned t
                  });
 }
 
+// The field with every amount of smoothing, each made when it is asked for.
+class FieldVariants {
+  public:
+    FieldVariants(DistanceGrid grid, std::span<const Eigen::Vector3d> points, unsigned threads)
+        : grid_(std::move(grid)),
+          points_(points),
+          shares_(points.empty() ? kSharpFirst : kSmoothFirst),
+          threads_(threads) {}
+
+    [[nodiscard]] std::size_t size() const { return made_.size(); }
+    const std::vector<float>& values(std::size_t s) {
+        if (!made_[s]) {
+            made_[s] = smoothed(grid_, shares_[s], threads_);
+            if (!points_.empty()) subtract_local_isolevel(points_, threads_, *made_[s]);
+        }
+        return made_[s]->values;
+    }
+
+  private:
+    DistanceGrid grid_;
+    std::span<const Eigen::Vector3d> points_;
+    std::array<float, 3> shares_;
+    unsigned threads_;
+    std::array<std::optional<DistanceGrid>, 3> made_;
+};
+
 }  // namespace
 
 std::optional<CoarseSurface> make_coarse_surface(std::span<const Ellipsoid> ellipsoids,
@@ -212,23 +246,28 @@ std::optional<CoarseSurface> make_coarse_surface(std::span<const Ellipsoid> elli
                                                  const PromisedTopology& promise, int cells,
                                                  unsigned threads) {
     const GridFrame frame = make_grid_frame(box, cells, kMarginCells);
-    DistanceGrid grid = make_distance_grid(ellipsoids, frame, threads);
-    const bool local = !points.empty();
-    if (local) subtract_local_isolevel(points, threads, grid);
+    FieldVariants fields(make_distance_grid(ellipsoids, frame, threads), points, threads);
     std::optional<CoarseSurface> best;
     Miss best_miss{};
-    for (const double offset : local ? kOffsets : kIsolevels) {
+    bool best_clean = false;
+    for (const double offset : points.empty() ? kIsolevels : kOffsets) {
         const double level = offset * frame.spacing;
-        TriangleMesh mesh =
-            without_debris(marching_cubes(frame, grid.values, static_cast<float>(level), threads),
-                           promise.components);
-        if (mesh.triangles.empty()) continue;
-        const Miss here = miss(analyse_topology(mesh), promise);
-        if (!best || here < best_miss) {
-            best_miss = here;
-            best = CoarseSurface{std::move(mesh), level, frame.spacing, here == Miss{0, 0, 0}};
+        for (std::size_t s = 0; s < fields.size(); ++s) {
+            const TriangleMesh whole =
+                marching_cubes(frame, fields.values(s), static_cast<float>(level), threads);
+            TriangleMesh mesh = without_debris(whole, promise.components);
+            if (mesh.triangles.empty()) continue;
+            const Miss here = miss(analyse_topology(mesh), promise);
+            // Debris tells of pits: the next amount of smoothing may do without.
+            const bool clean = mesh.triangles.size() == whole.triangles.size();
+            if (!best || std::tuple(here, !clean) < std::tuple(best_miss, !best_clean)) {
+                best_miss = here;
+                best_clean = clean;
+                best = CoarseSurface{std::move(mesh), level, frame.spacing, here == Miss{0, 0, 0}};
+            }
+            if (best->as_promised && best_clean) return best;
         }
-        if (best->as_promised) break;
+        if (best && best->as_promised) return best;
     }
     return best;
 }

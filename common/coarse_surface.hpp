@@ -29,10 +29,11 @@ struct CoarseSurface {
 
 /// The mesh that the ellipsoids alone give ([BK02] section 2; DESIGN section 4, Topology): distance
 /// grid of `cells` along the longest axis of `box`, then marching cubes at the isolevel whose
-/// topology is the promised one. Among several, the one nearest to the mean field value at the
-/// received `points`; among none, the one that misses by least. Surplus components below 1 % of the
-/// volume are dropped. Empty when no isolevel gives a surface. Requires at least one ellipsoid.
-/// Threads do not change the result.
+/// topology is the promised one, the field smoothed a little where that is needed for it. Among
+/// several, the one nearest to the mean field value at the received `points`; among none, the one
+/// that misses by least. Surplus components below 1 % of the volume are dropped, which the choice
+/// of smoothing avoids where it can. Empty when no
+/// isolevel gives a surface. Requires at least one ellipsoid. Threads do not change the result.
 std::optional<CoarseSurface> make_coarse_surface(std::span<const Ellipsoid> ellipsoids,
                                                  std::span<const Eigen::Vector3d> points,
                                                  const Eigen::AlignedBox3d& box,

@@ -68,6 +68,33 @@ DistanceGrid make_distance_grid(std::span<const Ellipsoid> ellipsoids, const Gri
     return grid;
 }
 
+DistanceGrid smoothed(const DistanceGrid& grid, float share, unsigned threads) {
+    assert(share >= 0.0F && share <= 0.25F);
+    DistanceGrid result = grid;
+    const GridFrame& frame = grid.frame;
+    const std::array<std::size_t, 3> strides = {1, frame.index(0, 1, 0), frame.index(0, 0, 1)};
+    std::vector<float> old;
+    for (const std::size_t stride : strides) {
+        old = result.values;
+        // The border layers of a slab's rows take part as neighbours only.
+        parallel_for(static_cast<std::size_t>(frame.dims[2]) - 2, threads,
+                     [&](std::size_t begin, std::size_t end) {
+                         for (std::size_t k = begin + 1; k < end + 1; ++k) {
+                             for (int j = 1; j + 1 < frame.dims[1]; ++j) {
+                                 const std::size_t row = frame.index(0, j, static_cast<int>(k));
+                                 const std::size_t last =
+                                     row + static_cast<std::size_t>(frame.dims[0]) - 1;
+                                 for (std::size_t v = row + 1; v < last; ++v) {
+                                     result.values[v] = (1.0F - 2.0F * share) * old[v] +
+                                                        share * (old[v - stride] + old[v + stride]);
+                                 }
+                             }
+                         }
+                     });
+    }
+    return result;
+}
+
 double sample(const DistanceGrid& grid, const Eigen::Vector3d& x) {
     const Eigen::Vector3d g = (x - grid.frame.origin) / grid.frame.spacing;
     std::array<int, 3> cell{};

@@ -25,6 +25,11 @@ struct DistanceGrid {
 DistanceGrid make_distance_grid(std::span<const Ellipsoid> ellipsoids, const GridFrame& frame,
                                 unsigned threads = 0);
 
+/// The field with the binomial filter (share, 1 - 2 share, share) run along every axis: closes pits
+/// and tunnels of a cell's size between ellipsoids, and rounds what is sharp. 0 <= share <= 1/4
+/// (asserted). The border keeps its values. Threads do not change the result.
+DistanceGrid smoothed(const DistanceGrid& grid, float share, unsigned threads = 0);
+
 /// Trilinear value at x; `outside` beyond the grid.
 double sample(const DistanceGrid& grid, const Eigen::Vector3d& x);
 

@@ -13,6 +13,7 @@
 #include "common/solid_voxels.hpp"
 #include "sender/constraint_tree.hpp"
 #include "sender/ellipsoid_growth.hpp"
+#include "sender/ellipsoid_refinement.hpp"
 #include "sender/ellipsoid_selection.hpp"
 #include "sender/surface_facets.hpp"
 #include "sender/surface_samples.hpp"
@@ -164,6 +165,24 @@ SelectionOptions selection_options(const DecompositionOptions& options, double d
     return selection;
 }
 
+std::vector<Ellipsoid> taken(const std::vector<Ellipsoid>& from,
+                             const std::vector<std::uint32_t>& order) {
+    std::vector<Ellipsoid> result;
+    result.reserve(order.size());
+    for (const std::uint32_t index : order) result.push_back(from[index]);
+    return result;
+}
+
+// The order made one of all `count`: those left out come last, by index.
+std::vector<std::uint32_t> with_the_rest(std::vector<std::uint32_t> order, std::size_t count) {
+    std::vector<bool> there(count, false);
+    for (const std::uint32_t index : order) there[index] = true;
+    for (std::uint32_t index = 0; index < count; ++index) {
+        if (!there[index]) order.push_back(index);
+    }
+    return order;
+}
+
 // Whether there is a frame to compute in: not for the empty mesh, nor for one single point.
 bool has_extent(const TriangleMesh& mesh) {
     const Eigen::AlignedBox3d box = common::bounding_box(mesh.positions);
@@ -195,12 +214,21 @@ Decomposition select_ellipsoids(const std::vector<Ellipsoid>& candidates, const 
     if (candidates.empty() || !has_extent(solid)) return decomposition;
     const Eigen::AlignedBox3d box = common::bounding_box(solid.positions);
     const Voxels voxels = voxels_of(solid, box, options.grid, options.threads);
-    const Selection selection =
-        select_greedily(candidates, voxels.frame, voxels.solid,
-                        selection_options(options, box.diagonal().stableNorm()));
-    for (const std::uint32_t chosen :
-         selection.order.empty() ? by_volume(candidates, options.ellipsoids) : selection.order) {
-        decomposition.ellipsoids.push_back(candidates[chosen]);
+    const SelectionOptions rule = selection_options(options, box.diagonal().stableNorm());
+    Selection selection = select_greedily(candidates, voxels.frame, voxels.solid, rule);
+    decomposition.ellipsoids =
+        taken(candidates, selection.order.empty() ? by_volume(candidates, options.ellipsoids)
+                                                  : selection.order);
+    if (options.refine > 0 && !selection.order.empty()) {
+        RefinementOptions refinement;
+        refinement.rounds = options.refine;
+        // Copies save most ellipsoids from the loss that the selection reckons with.
+        refinement.loss = rule.loss / 3.0;
+        refinement.threads = options.threads;
+        const std::vector<Ellipsoid> refined =
+            refine_ellipsoids(decomposition.ellipsoids, solid, refinement);
+        selection = select_greedily(refined, voxels.frame, voxels.solid, rule);
+        decomposition.ellipsoids = taken(refined, with_the_rest(selection.order, refined.size()));
     }
     const double all = std::max(1.0, static_cast<double>(selection.solid));
     decomposition.covered = static_cast<double>(selection.covered) / all;

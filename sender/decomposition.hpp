@@ -23,6 +23,7 @@ struct DecompositionOptions {
     std::size_t candidates = 10'000;  // how many seeds to grow
     Criterion criterion = Criterion::robust;
     double expected_loss = 0.3;  // probability that a selected ellipsoid is lost; robust only
+    int refine = 20;             // rounds of local optimisation of the selected; 0: none
     int grid = 128;              // selection voxels along the longest axis
     int presmooth = -1;          // Laplacian steps; -1: by the mesh's density (0 to 3)
     double epsilon = 0.0004;     // offset of the touching points, share of the diagonal
@@ -44,7 +45,8 @@ struct Decomposition {
 };
 
 /// [BK02] section 3, whole: presmoothing, surface seeds, growth sphere -> alpha -> beta with
-/// epsilon, and selection. `solid` is closed and outward oriented (PreparedModel::solid). Results
+/// epsilon, and selection; then the selected are refined (ellipsoid_refinement.hpp) and ordered
+/// anew by the same rule. `solid` is closed and outward oriented (PreparedModel::solid). Results
 /// are in its frame and unit; inside, everything is scaled to a bounding-box diagonal of 1. Fewer
 /// than options.ellipsoids come back only when no candidate adds anything. Same solid, options:
 /// same bits, on any number of threads. Throws std::invalid_argument when not a single ellipsoid

@@ -32,7 +32,7 @@ using common::Ellipsoid;
 
 // Part of the key as well: counts up when the file's layout or the result of decompose() changes,
 // so that a newer program does not serve an older one's work.
-constexpr std::uint8_t kVersion = 1;
+constexpr std::uint8_t kVersion = 2;
 constexpr std::string_view kMagic = "ellidec";
 constexpr std::size_t kKeyBytes = 32;
 constexpr std::size_t kHeaderBytes = 8 + kKeyBytes + 5 * 8;
@@ -185,6 +185,7 @@ std::string decomposition_key(const common::TriangleMesh& solid,
     bytes.u64(options.candidates);
     bytes.u64(static_cast<std::uint64_t>(options.criterion));
     bytes.f64(options.expected_loss);
+    bytes.u64(static_cast<std::uint64_t>(options.refine));
     bytes.u64(static_cast<std::uint64_t>(options.grid));
     bytes.u64(static_cast<std::uint64_t>(options.presmooth));
     bytes.f64(options.epsilon);

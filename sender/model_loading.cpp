@@ -1,8 +1,6 @@
 // sender/model_loading.cpp
 #include "sender/model_loading.hpp"
 
-#include <chrono>
-#include <ctime>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -13,23 +11,6 @@ namespace ellicast::sender {
 namespace {
 
 namespace fs = std::filesystem;
-
-double cpu_seconds() {
-    std::timespec time{};
-    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-/// Runs a stage and notes what it took.
-template <class Work>
-auto timed(std::vector<StageTime>& stages, const char* stage, const Work& work) {
-    const auto wall = std::chrono::steady_clock::now();
-    const double cpu = cpu_seconds();
-    auto result = work();
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - wall;
-    stages.push_back({stage, took.count(), cpu_seconds() - cpu});
-    return result;
-}
 
 /// Geometry says what is wrong with a model; the user wants to know with which.
 template <class Work>

@@ -10,25 +10,21 @@
 #include "sender/broadcast_object.hpp"
 #include "sender/decomposition.hpp"
 #include "sender/model_preparation.hpp"
+#include "sender/stage_time.hpp"
+#include "sender/topology_certificate.hpp"
 
 namespace ellicast::sender {
-
-/// What one stage took; CPU over all threads of the program.
-struct StageTime {
-    std::string stage;
-    double wall_s = 0;
-    double cpu_s = 0;
-};
 
 /// A model ready for sending, and the story of how it came to be.
 struct LoadedModel {
     std::filesystem::path path;
     BroadcastObject object;  // empty when the model was only decomposed
     ShapePromise promise;
-    Decomposition decomposition;        // without the ellipsoids: those are in the object
-    bool cached = false;                // the decomposition was found, not computed
-    std::vector<StageTime> stages;      // read, prepare, cache, decompose, promise, object
-    std::vector<std::string> warnings;  // of preparation, cache and promise
+    Decomposition decomposition;             // without the ellipsoids: those are in the object
+    bool cached = false;                     // the decomposition was found, not computed
+    std::optional<Certificate> certificate;  // when one was asked for and the topology is promised
+    std::vector<StageTime> stages;           // read, prepare, cache, decompose, promise, object
+    std::vector<std::string> warnings;       // of preparation, cache and promise
 };
 
 /// Reads a model file, prepares and decomposes it, and makes its object, which is named after the

@@ -44,6 +44,9 @@ struct Texts {
     std::string tags = "8";
     std::string colour = "on";
     std::string order = "importance";
+    std::string design_loss = "0.3";
+    std::string refine = "20";
+    std::string certify;
     std::string rate = "20M";
     std::string rounds = "1";
     std::string redundancy = "1.0";
@@ -91,6 +94,39 @@ common::Endpoint destination_of(const std::string& text) {
     if (destination.host.empty()) throw common::refusal(text, "has no host");
     if (destination.port == 0) throw common::refusal(text, "nobody can be reached on port 0");
     return destination;
+}
+
+int refinement_of(const std::string& text) {
+    constexpr int kMostRounds = 1000;
+    if (text == "off") return 0;
+    const auto rounds = common::number<int>(text);
+    if (!rounds || *rounds < 0 || *rounds > kMostRounds) {
+        throw common::refusal(text, "is not a number of rounds from 0 to 1000, nor 'off'");
+    }
+    return *rounds;
+}
+
+/// "0.5:0.95" is a loss of 0.5 and a share of 0.95.
+CertificateGoal goal_of(const std::string& text) {
+    const std::size_t colon = text.find(':');
+    const auto loss = common::number<double>(text.substr(0, colon));
+    const auto share =
+        common::number<double>(colon == std::string::npos ? "" : text.substr(colon + 1));
+    if (!loss || !(*loss >= 0.0 && *loss < 1.0)) {
+        throw common::refusal(text, "is not LOSS:SHARE with a loss from 0 to below 1");
+    }
+    if (!share || !(*share >= 0.01 && *share <= 0.999)) {
+        throw common::refusal(text, "is not LOSS:SHARE with a share from 0.01 to 0.999");
+    }
+    return {*loss, *share};
+}
+
+double design_loss_of(const std::string& text) {
+    const auto loss = common::number<double>(text);
+    if (!loss || !(*loss >= 0.0 && *loss <= 0.95)) {
+        throw common::refusal(text, "is not a loss from 0 to 0.95");
+    }
+    return *loss;
 }
 
 protocol::SessionId session_of(const std::string& text) {
@@ -157,6 +193,16 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
         ->type_name("RULE")
         ->check(CLI::IsMember(kCriteria).description(""))
         ->capture_default_str();
+    app.add_option("--design-loss", texts.design_loss,
+                   "Share of the ellipsoids whose loss 'robust' reckons with")
+        ->type_name("P")
+        ->check(accepted_by(design_loss_of))
+        ->capture_default_str();
+    app.add_option("--refine", texts.refine,
+                   "Rounds of fitting the selected to the surface, or off: as they grew")
+        ->type_name("ROUNDS")
+        ->check(accepted_by(refinement_of))
+        ->capture_default_str();
     app.add_option("--tags", texts.tags,
                    "Bits of a normal with every vertex: 0, 8, 12 or 16; '+ring' behind them adds a "
                    "byte about its neighbours")
@@ -177,6 +223,12 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
         "Of seeds and of the order of vertices; another seed, another object");
     add_number<unsigned>(app, "--threads", geometry.threads, 0, 1024,
                          "Threads for geometry; 0: one per core");
+    app.add_option(
+           "--certify", texts.certify,
+           "Have at least SHARE of the receivers see the right topology after losing LOSS of "
+           "the datagrams: try it, and add copies or ellipsoids until they do")
+        ->type_name("LOSS:SHARE")
+        ->check(accepted_by(goal_of));
     app.add_option("--cache", texts.cache, "Keep decompositions here, and take them from here")
         ->type_name("DIR");
     app.add_option("--decompose-only", texts.decompose_only,
@@ -264,6 +316,9 @@ void interpret(const Texts& texts, Options& options) {
     options.tags = tags_of(texts.tags);
     options.tags.colour = texts.colour == "on";
     options.order = texts.order == "spread" ? SendingOrder::spread : SendingOrder::importance;
+    options.decomposition.expected_loss = design_loss_of(texts.design_loss);
+    options.decomposition.refine = refinement_of(texts.refine);
+    if (!texts.certify.empty()) options.certify = goal_of(texts.certify);
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);

@@ -13,6 +13,7 @@
 #include "protocol/datagram.hpp"
 #include "sender/broadcast_object.hpp"
 #include "sender/decomposition.hpp"
+#include "sender/topology_certificate.hpp"
 #include "sender/vertex_tags.hpp"
 
 namespace ellicast::sender {
@@ -35,6 +36,7 @@ struct Options {
     SendingOrder order = SendingOrder::importance;
     std::size_t copies = 3;
     double redundancy = 1.0;  // bytes of a round, in rounds that hold each vertex once
+    std::optional<CertificateGoal> certify;
     std::uint64_t bits_per_second = 20'000'000;  // 0: as fast as the socket takes them
     std::uint32_t rounds = 1;                    // 0: forever
     std::size_t datagram_bytes = protocol::kDefaultDatagramBytes;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "sender/certified_loading.hpp"
 #include "sender/model_loading.hpp"
 #include "sender/report.hpp"
 #include "sender/session.hpp"
@@ -17,7 +18,22 @@
 namespace ellicast::sender {
 namespace {
 
+void log_certificate(const LoadedModel& model) {
+    const Certificate& certificate = *model.certificate;
+    if (certificate.holds) {
+        spdlog::info("{}: {}, with {} copies of {} ellipsoids", model.path.string(),
+                     certificate_text(certificate), certificate.copies, certificate.ellipsoids);
+        return;
+    }
+    spdlog::warn(
+        "{}: no certificate: a topology right for {:g} at loss {:g} was not reached; the best was "
+        "{} of {} draws (at least {:.3f}) with {} copies of {} ellipsoids",
+        model.path.string(), certificate.goal.share, certificate.goal.loss, certificate.right,
+        certificate.draws, certificate.lower_bound, certificate.copies, certificate.ellipsoids);
+}
+
 void log_model(const LoadedModel& model) {
+    if (model.certificate) log_certificate(model);
     for (const std::string& warning : model.warnings) {
         spdlog::warn("{}: {}", model.path.string(), warning);
     }
@@ -27,15 +43,61 @@ void log_model(const LoadedModel& model) {
     }
 }
 
+PlanOptions plan_options_of(const Options& options) {
+    PlanOptions plan;
+    plan.datagram_bytes = options.datagram_bytes;
+    plan.copies = options.copies;
+    plan.bits_per_second = options.bits_per_second;
+    plan.rounds = options.rounds;
+    return plan;
+}
+
+LoadedModel load_certified_model(const std::filesystem::path& path, const Options& options) {
+    CertificationOptions certification;
+    certification.trial.goal = *options.certify;
+    certification.trial.seed = options.decomposition.seed;
+    certification.trial.threads = options.decomposition.threads;
+    const bool progress = !options.quiet && ::isatty(STDERR_FILENO) == 1;
+    certification.trial.on_draws = [&](const LossTrial& trial) {
+        if (!progress) return;
+        std::fprintf(stderr, "\r%s: certifying, %zu of %zu draws right\033[K", path.c_str(),
+                     trial.right, trial.draws);
+    };
+    certification.plan = plan_options_of(options);
+    certification.ellipsoids = options.decomposition.ellipsoids;
+    certification.cache = options.cache;
+    const auto load = [&](std::size_t ellipsoids) {
+        DecompositionOptions decomposition = options.decomposition;
+        decomposition.ellipsoids = ellipsoids;
+        return load_model(path, decomposition, options.cache);
+    };
+    LoadedModel model = load_certified(load, certification);
+    if (progress) std::fputs("\r\033[K", stderr);
+    return model;
+}
+
+LoadedModel decompose_only(const std::filesystem::path& path, const Options& options) {
+    DecompositionOptions decomposition = options.decomposition;
+    std::optional<Certificate> certificate;
+    if (options.certify) certificate = load_certified_model(path, options).certificate;
+    if (certificate) decomposition.ellipsoids = certificate->ellipsoids;
+    LoadedModel model =
+        decompose_to_file(path, decomposition, options.cache, *options.decompose_only);
+    model.certificate = certificate;
+    return model;
+}
+
 std::vector<LoadedModel> load_models(const Options& options) {
     std::vector<LoadedModel> models;
     for (const std::filesystem::path& path : options.models) {
-        models.push_back(
-            options.decompose_only
-                ? decompose_to_file(path, options.decomposition, options.cache,
-                                    *options.decompose_only)
-                : load_model(path, options.decomposition, options.cache, options.tags,
-                             options.order));
+        if (options.decompose_only) {
+            models.push_back(decompose_only(path, options));
+        } else if (options.certify) {
+            models.push_back(load_certified_model(path, options));
+        } else {
+            models.push_back(load_model(path, options.decomposition, options.cache, options.tags,
+                                        options.order));
+        }
         log_model(models.back());
     }
     return models;
@@ -44,15 +106,11 @@ std::vector<LoadedModel> load_models(const Options& options) {
 /// Takes the objects out of the models.
 std::vector<RoundPlan> make_plans(std::vector<LoadedModel>& models, const Options& options,
                                   const Identity& identity) {
-    PlanOptions plan_options;
-    plan_options.datagram_bytes = options.datagram_bytes;
-    plan_options.copies = options.copies;
-    plan_options.redundancy = options.redundancy;
-    plan_options.bits_per_second = options.bits_per_second;
-    plan_options.rounds = options.rounds;
+    PlanOptions plan_options = plan_options_of(options);
     plan_options.session = identity.session;
     std::vector<RoundPlan> plans;
     for (LoadedModel& model : models) {
+        plan_options.copies = model.certificate ? model.certificate->copies : options.copies;
         const RoundPlan& plan = plans.emplace_back(std::move(model.object), plan_options);
         spdlog::info("{}: {} vertices, {} ellipsoids x {}, {} datagrams a round",
                      model.path.string(), plan.object().vertices.size(),

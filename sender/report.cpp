@@ -45,6 +45,13 @@ ordered_json object_json(const LoadedModel& model, const RoundPlan& plan) {
     return json;
 }
 
+ordered_json certificate_json(const Certificate& certificate) {
+    return {{"loss", certificate.goal.loss}, {"share", certificate.goal.share},
+            {"holds", certificate.holds},    {"draws", certificate.draws},
+            {"right", certificate.right},    {"share_at_least", certificate.lower_bound},
+            {"copies", certificate.copies},  {"ellipsoids", certificate.ellipsoids}};
+}
+
 ordered_json model_json(const LoadedModel& model, const RoundPlan* plan) {
     ordered_json json;
     json["model"] = model.path.string();
@@ -54,6 +61,7 @@ ordered_json model_json(const LoadedModel& model, const RoundPlan* plan) {
                              {"covered", model.decomposition.covered},
                              {"outside", model.decomposition.outside},
                              {"cached", model.cached}};
+    if (model.certificate) json["certificate"] = certificate_json(*model.certificate);
     json["seconds"] = ordered_json::object();
     for (const StageTime& stage : model.stages) {
         json["seconds"][stage.stage] = {{"wall", stage.wall_s}, {"cpu", stage.cpu_s}};

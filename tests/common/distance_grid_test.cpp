@@ -71,6 +71,27 @@ TEST_CASE("order, copies and threads change no bit of the grid") {
                         [](float v) { return std::isfinite(v); }));
 }
 
+TEST_CASE("smoothing keeps a plane, fills a pit and does not depend on threads") {
+    DistanceGrid grid;
+    grid.frame.dims = {9, 8, 7};
+    grid.values.resize(grid.frame.size());
+    for (int k = 0; k < 7; ++k) {
+        for (int j = 0; j < 8; ++j) {
+            for (int i = 0; i < 9; ++i) {
+                grid.values[grid.frame.index(i, j, k)] = static_cast<float>(i) - 4.0F;
+            }
+        }
+    }
+    CHECK(smoothed(grid, 0.25F).values == grid.values);
+    const std::size_t pit = grid.frame.index(3, 4, 3);
+    grid.values[pit] = 1.0F;
+    const DistanceGrid soft = smoothed(grid, 0.25F, 1);
+    CHECK(soft.values[pit] == Approx(-0.75F));
+    CHECK(soft.values[grid.frame.index(0, 4, 3)] == -4.0F);
+    CHECK(smoothed(grid, 0.25F, 3).values == soft.values);
+    CHECK(smoothed(grid, 0.0F).values == grid.values);
+}
+
 TEST_CASE("a node on the centre of an ellipsoid gets minus its smallest semi-axis") {
     const GridFrame frame = frame_of(21);
     const Eigen::Vector3d node = frame.position(10, 10, 10);

@@ -219,6 +219,7 @@ TEST_CASE("the key is a function of the solid and of what changes the result, al
         [](DecompositionOptions& o) { o.epsilon *= 1.01; },
         [](DecompositionOptions& o) { o.facet_edge *= 1.01; },
         [](DecompositionOptions& o) { o.max_aspect += 1; },
+        [](DecompositionOptions& o) { o.refine += 1; },
         [](DecompositionOptions& o) { o.seed += 1; },
     };
     std::vector<std::string> keys = {key};

@@ -49,6 +49,9 @@ TEST_CASE("defaults are those of the manual") {
     CHECK(options.decomposition.ellipsoids == 400);
     CHECK(options.decomposition.candidates == 10'000);
     CHECK(options.decomposition.criterion == Criterion::robust);
+    CHECK(options.decomposition.expected_loss == 0.3);
+    CHECK_FALSE(options.certify);
+    CHECK(options.decomposition.refine == 20);
     CHECK(options.decomposition.seed == 1);
     CHECK(options.tags.normal_bits == 8);
     CHECK_FALSE(options.tags.ring);
@@ -76,6 +79,12 @@ TEST_CASE("every flag reaches its option") {
                                       "2500",
                                       "--copies",
                                       "2",
+                                      "--certify",
+                                      "0.6:0.99",
+                                      "--design-loss",
+                                      "0.4",
+                                      "--refine",
+                                      "7",
                                       "--criterion",
                                       "volume",
                                       "--redundancy",
@@ -118,6 +127,9 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.port == 6000);
     CHECK(options.decomposition.ellipsoids == 200);
     CHECK(options.decomposition.candidates == 2500);
+    CHECK(options.decomposition.expected_loss == 0.4);
+    CHECK(options.certify == CertificateGoal{0.6, 0.99});
+    CHECK(options.decomposition.refine == 7);
     CHECK(options.decomposition.criterion == Criterion::volume);
     CHECK(options.order == SendingOrder::spread);
     CHECK(options.decomposition.seed == 18'446'744'073'709'551'615u);
@@ -139,6 +151,10 @@ TEST_CASE("every flag reaches its option") {
     CHECK(options.identity.ssrc == 4'294'967'295u);
     CHECK(options.identity.first_sequence == 65'535);
     CHECK(options.identity.first_timestamp == 0u);
+}
+
+TEST_CASE("refinement can be switched off") {
+    CHECK(accepted({"a.ply", "--to", "h", "--refine", "off"}).decomposition.refine == 0);
 }
 
 TEST_CASE("a rate of 0 means unpaced, and 0 rounds mean forever") {
@@ -188,6 +204,12 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
         std::vector<const char*>{"a.ply", "--to", "h", "--candidates", "0"},
         std::vector<const char*>{"a.ply", "--to", "h", "--copies", "0"},
         std::vector<const char*>{"a.ply", "--to", "h", "--copies", "65"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--design-loss", "1"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--refine", "on"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "0.5"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "1:0.95"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "0.5:1"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--certify", "0.5:nan"},
         std::vector<const char*>{"a.ply", "--to", "h", "--criterion", "beauty"},
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "575"},
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "65508"},
@@ -235,16 +257,19 @@ TEST_CASE("help shows every flag with examples, version the version; both end wi
     for (const char* text : {"MODEL",           "--to",
                              "--ellipsoids",    "--candidates",
                              "--copies",        "--criterion",
-                             "--rate",          "--rounds",
-                             "--datagram",      "--seed",
-                             "--cache",         "--decompose-only",
-                             "--tags",          "--colour",
-                             "--report",        "--log-level",
-                             "--quiet",         "--config",
-                             "--version",       "--threads",
-                             "--drop",          "--drop-ellipsoids",
-                             "--drop-vertices", "--loss",
-                             "Examples:",       "Exit codes"}) {
+                             "--certify",       "--refine",
+                             "--design-loss",   "--order",
+                             "--redundancy",    "--rate",
+                             "--rounds",        "--datagram",
+                             "--seed",          "--cache",
+                             "--decompose-only", "--tags",
+                             "--colour",        "--report",
+                             "--log-level",     "--quiet",
+                             "--config",        "--version",
+                             "--threads",       "--drop",
+                             "--drop-ellipsoids", "--drop-vertices",
+                             "--loss",          "Examples:",
+                             "Exit codes"}) {
         CHECK_THAT(help.out, Catch::Contains(text));
     }
     CHECK(help.err.empty());
