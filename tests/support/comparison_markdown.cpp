@@ -55,7 +55,7 @@ void write_head(std::ostream& out, const std::string& first, const std::vector<d
 // rms, and behind it how many of the runs are not as they should be.
 std::string cell(const ComparisonMedian* m) {
     if (m == nullptr) return "";
-    if (m->surfaces == 0) return "nothing";
+    if (std::isnan(m->rms)) return "nothing";
     std::string text = distance(m->rms);
     if (m->right < m->runs) {
         text.append(" (").append(std::to_string(m->right)).append("/");

@@ -65,13 +65,22 @@ class Fields {
     std::istringstream stream_;
 };
 
-// NaN for none.
+// Below this share of the diagonal there is no error, and no ratio to it.
+constexpr double kExact = 1e-9;
+
+double infinite_if_none(double value) {
+    return std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+}
+
+// NaN for none, and where the middle is infinite.
 double median(std::vector<double> values) {
     std::erase_if(values, [](double value) { return std::isnan(value); });
     if (values.empty()) return ComparisonRow::kNone;
     std::sort(values.begin(), values.end());
     const std::size_t half = values.size() / 2;
-    return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+    const double middle =
+        values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+    return std::isfinite(middle) ? middle : ComparisonRow::kNone;
 }
 
 template <class Field>
@@ -91,14 +100,14 @@ ComparisonMedian median_of(const std::vector<const ComparisonRow*>& rows) {
         m.surfaces += row->has_surface();
         m.right += row->topology_right;
     }
-    std::vector<double> rms = column(rows, [](const auto& r) { return r.rms; });
+    std::vector<double> rms = column(rows, [](const auto& r) { return infinite_if_none(r.rms); });
     m.rms = median(rms);
-    std::erase_if(rms, [](double value) { return std::isnan(value); });
+    std::erase_if(rms, [](double value) { return std::isinf(value); });
     if (!rms.empty()) {
         m.rms_least = *std::min_element(rms.begin(), rms.end());
         m.rms_largest = *std::max_element(rms.begin(), rms.end());
     }
-    m.max = median(column(rows, [](const auto& r) { return r.max; }));
+    m.max = median(column(rows, [](const auto& r) { return infinite_if_none(r.max); }));
     m.vertices = median(column(rows, [](const auto& r) { return r.vertices; }));
     m.bytes = median(column(rows, [](const auto& r) { return r.bytes; }));
     m.stream_bytes = median(column(rows, [](const auto& r) { return r.stream_bytes; }));
@@ -176,8 +185,8 @@ std::vector<ComparisonMedian> medians_of(const std::vector<ComparisonRow>& rows)
         const auto floor = place.find({m.model, "floor", m.loss, m.sent});
         if (floor == place.end()) continue;
         const ComparisonMedian& reference = medians[floor->second];
-        if (reference.rms > 0) m.to_floor = m.rms / reference.rms;
-        if (reference.max > 0) m.max_to_floor = m.max / reference.max;
+        if (reference.rms > kExact) m.to_floor = m.rms / reference.rms;
+        if (reference.max > kExact) m.max_to_floor = m.max / reference.max;
     }
     return medians;
 }

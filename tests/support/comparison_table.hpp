@@ -48,8 +48,9 @@ void write_csv(std::ostream& out, const ComparisonRow& row);
 /// Throws std::runtime_error that names the line for what write_csv did not write.
 std::vector<ComparisonRow> read_csv(std::istream& in);
 
-/// Rows of one model, method, loss and share sent: medians over the seeds. Distances are over the
-/// runs that have a surface.
+/// Rows of one model, method, loss and share sent: medians over the seeds. No surface counts as an
+/// infinite error, so that half the runs without one make NaN; least and largest are over the
+/// others. There is no ratio to a floor that is exact.
 struct ComparisonMedian {
     std::string model;
     std::string method;

@@ -93,6 +93,23 @@ TEST_CASE("medians are over the seeds and stand beside the floor") {
     CHECK_FALSE(medians[4].rms == medians[4].rms);
 }
 
+TEST_CASE("half the runs without a surface are no result, and an exact floor is no measure") {
+    std::vector<ComparisonRow> rows;
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+        const bool whole = seed <= 2;
+        rows.push_back(row_of("cow", "code", 0.5, seed, whole ? 1e-5 : ComparisonRow::kNone));
+        rows.push_back(row_of("cow", "floor", 0.5, seed, 1e-17));
+    }
+    auto medians = medians_of(rows);
+    CHECK(medians[0].surfaces == 2);
+    CHECK_FALSE(medians[0].rms == medians[0].rms);
+    CHECK(medians[0].rms_largest == Approx(1e-5));
+    rows[4].rms = 1e-5;
+    medians = medians_of(rows);
+    CHECK(medians[0].rms == Approx(1e-5));
+    CHECK_FALSE(medians[0].to_floor == medians[0].to_floor);
+}
+
 TEST_CASE("the Markdown says rms, wrong topology, nothing, and the geometric mean") {
     const std::string text = markdown_of(some_rows());
     CHECK(text.find("| model | method | 50 % |\n| --- | --- | --- |\n") != std::string::npos);
