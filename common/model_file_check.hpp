@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "common/triangle_mesh.hpp"
+
 namespace ellicast::common {
 
 enum class ModelFormat { ply, obj, off, stl };
@@ -31,6 +33,8 @@ struct PlainModelFile {
     /// columns that are not float32), these are the positions as doubles, one per vertex. Empty
     /// otherwise.
     std::vector<Eigen::Vector3d> exact;
+    /// One per vertex where the file has such (not in STL), in `bytes` there are none. Else empty.
+    std::vector<Colour> colours;
 };
 
 /// A face of more corners is refused: OpenMesh's OBJ reader takes the square of it in time.

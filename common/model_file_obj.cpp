@@ -1,10 +1,12 @@
 // common/model_file_obj.cpp
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/file_colours.hpp"
 #include "common/model_file_check.hpp"
 #include "common/model_file_text.hpp"
 
@@ -13,7 +15,8 @@ namespace {
 
 constexpr std::int64_t kMaxVertices = std::numeric_limits<std::int32_t>::max();
 
-// Only `v` and `f` lines get through, with indices counted from the start of the file. All else
+// Only `v` and `f` lines get through, with indices counted from the start of the file; colours
+// behind `v x y z` are kept aside. All else
 // (normals, texture coordinates, groups, curves, materials) says nothing of the shape as a set of
 // faces.
 class ObjCheck {
@@ -34,6 +37,7 @@ class ObjCheck {
             fail_at(line_of_largest_, "index " + std::to_string(largest_) + " is out of range");
         }
         file_.vertices = file_.exact.size();
+        file_.colours = colours_.take(file_.vertices);
         return std::move(file_);
     }
 
@@ -51,6 +55,10 @@ class ObjCheck {
             file_.bytes += word;
         }
         file_.bytes += '\n';
+        std::array<std::string_view, 3> colour;
+        for (std::string_view& word : colour) word = scan_.token();
+        // One number more is a weight; with four it is not said which is which.
+        if (!colour[2].empty() && scan_.token().empty()) colours_.add(colour);
         file_.exact.push_back(position);
     }
 
@@ -100,6 +108,7 @@ class ObjCheck {
 
     TextScanner scan_;
     PlainModelFile file_;
+    FileColours colours_;
     std::int64_t largest_ = 0;
     std::size_t line_of_largest_ = 0;
 };

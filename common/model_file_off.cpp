@@ -1,10 +1,12 @@
 // common/model_file_off.cpp
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/file_colours.hpp"
 #include "common/model_file_check.hpp"
 #include "common/model_file_text.hpp"
 
@@ -13,7 +15,7 @@ namespace {
 
 // [ST][C][N]OFF: vertices may carry normals, colours and texture coordinates behind x y z, one
 // vertex a line, and faces a colour behind their corners, one face a line. None of that gets
-// through.
+// through; colours of vertices are kept aside where the keyword announces them.
 class OffCheck {
   public:
     explicit OffCheck(const std::string& bytes) : size_(bytes.size()), scan_(bytes, '#') {}
@@ -26,6 +28,7 @@ class OffCheck {
         file_.exact.reserve(file_.vertices);
         for (std::size_t i = 0; i < file_.vertices; ++i) read_vertex();
         for (std::size_t i = 0; i < file_.faces; ++i) read_face();
+        file_.colours = colours_.take(file_.vertices);
         return std::move(file_);
     }
 
@@ -34,7 +37,10 @@ class OffCheck {
         if (!scan_.next_line()) throw BadModelFile("empty");
         std::string_view keyword = scan_.token();
         for (const std::string_view optional : {"ST", "C", "N"}) {
-            if (keyword.starts_with(optional)) keyword.remove_prefix(optional.size());
+            if (!keyword.starts_with(optional)) continue;
+            keyword.remove_prefix(optional.size());
+            coloured_ = coloured_ || optional == "C";
+            with_normals_ = with_normals_ || optional == "N";
         }
         if (keyword == "4OFF" || keyword == "nOFF" || keyword == "4nOFF") {
             throw BadModelFile("an OFF file of other than three dimensions");
@@ -78,6 +84,14 @@ class OffCheck {
         }
         file_.bytes += '\n';
         file_.exact.push_back(position);
+        if (coloured_) read_colour();
+    }
+
+    void read_colour() {
+        for (int axis = 0; with_normals_ && axis < 3; ++axis) scan_.token();
+        std::array<std::string_view, 3> colour;
+        for (std::string_view& word : colour) word = scan_.token();
+        colours_.add(colour);
     }
 
     void read_face() {
@@ -103,6 +117,9 @@ class OffCheck {
     std::size_t size_;
     TextScanner scan_;
     PlainModelFile file_;
+    bool coloured_ = false;
+    bool with_normals_ = false;
+    FileColours colours_;
 };
 
 }  // namespace

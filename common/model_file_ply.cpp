@@ -9,8 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/file_colours.hpp"
 #include "common/model_file_check.hpp"
 #include "common/model_file_text.hpp"
+#include "common/number_text.hpp"
 #include "common/ply_header.hpp"
 
 namespace ellicast::common {
@@ -49,6 +51,15 @@ class BinaryBody {
             throw BadModelFile("a coordinate is beyond the range of float32");
         }
         return value;
+    }
+
+    /// 0 to 255, or a share of one.
+    std::uint8_t channel(PlyScalar type) {
+        const std::uint64_t raw = take(size_of(type));
+        if (!is_real(type)) return static_cast<std::uint8_t>(raw);
+        return channel_of_share(type == PlyScalar::f32
+                                    ? std::bit_cast<float>(static_cast<std::uint32_t>(raw))
+                                    : std::bit_cast<double>(raw));
     }
 
     void skip(PlyScalar type, std::uint64_t times) {
@@ -92,6 +103,11 @@ class TextBody {
         return parse_coordinate(word, words_.line());
     }
 
+    std::uint8_t channel(PlyScalar type) {
+        const double value = number<double>(next()).value_or(0.0);
+        return is_real(type) ? channel_of_share(value) : channel_of_number(value);
+    }
+
     void skip(PlyScalar, std::uint64_t times) {
         for (std::uint64_t i = 0; i < times; ++i) next();
     }
@@ -109,6 +125,7 @@ class TextBody {
 // What the walk collects.
 struct Soup {
     std::vector<Eigen::Vector3d> positions;  // unless the file is plain and all float32
+    std::vector<Colour> colours;             // where the file has them
     std::string faces;                       // in the form of write_plain, unless the file is plain
 };
 
@@ -131,15 +148,21 @@ void skip_property(Body& body, const PlyProperty& property) {
 template <class Body>
 void walk_vertex(Body& body, const PlyLayout& layout, Soup& soup) {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    Colour colour{};
     for (std::size_t c = 0; c < layout.vertex->properties.size(); ++c) {
         const auto axis = std::find(layout.coordinate.begin(), layout.coordinate.end(), c);
+        const auto channel = std::find(layout.colour.begin(), layout.colour.end(), c);
         const PlyProperty& property = layout.vertex->properties[c];
-        if (axis == layout.coordinate.end()) {
-            skip_property(body, property);
-        } else {
+        if (axis != layout.coordinate.end()) {
             position[axis - layout.coordinate.begin()] = body.coordinate(property.type);
+        } else if (channel != layout.colour.end()) {
+            colour[static_cast<std::size_t>(channel - layout.colour.begin())] =
+                body.channel(property.type);
+        } else {
+            skip_property(body, property);
         }
     }
+    if (layout.colour[0] != kNoColumn) soup.colours.push_back(colour);
     if (!layout.plain || !layout.float32) soup.positions.push_back(position);
 }
 
@@ -231,6 +254,7 @@ PlainModelFile check_ply_file(std::string bytes) {
     file.faces = static_cast<std::size_t>(layout.face->entries);
     file.bytes = layout.plain ? std::move(bytes) : write_plain(layout, soup);
     if (!layout.float32) file.exact = std::move(soup.positions);
+    file.colours = std::move(soup.colours);
     return file;
 }
 

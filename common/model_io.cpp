@@ -51,7 +51,9 @@ ModelFormat require_format(const std::string& extension) {
 
 TriangleMesh parse(std::string bytes, ModelFormat format) {
     PlainModelFile file = check_model_file(std::move(bytes), format);
+    std::vector<Colour> colours = std::move(file.colours);
     TriangleMesh mesh = triangulate(read_through_openmesh(std::move(file), format));
+    mesh.colours = std::move(colours);
     if (mesh.triangles.empty()) throw BadModelFile("no faces (all are degenerate)");
     return mesh;
 }
@@ -128,8 +130,16 @@ std::string ply_header(const TriangleMesh& mesh, const PlyOptions& options) {
     if (!comment.empty()) header += "comment " + comment + "\n";
     header += "element vertex " + std::to_string(mesh.positions.size()) + "\n";
     for (const char* axis : {"x", "y", "z"}) header += "property " + type + " " + axis + "\n";
+    if (!mesh.colours.empty()) {
+        for (const char* channel : {"red", "green", "blue"}) {
+            header += std::string("property uchar ") + channel + "\n";
+        }
+    }
     for (const PlyVertexProperty& property : options.properties) {
         header += "property float " + property.name + "\n";
+    }
+    for (const PlyByteProperty& property : options.byte_properties) {
+        header += "property uchar " + property.name + "\n";
     }
     return header + "element face " + std::to_string(mesh.triangles.size()) +
            "\nproperty list uchar int vertex_indices\nend_header\n";
@@ -149,16 +159,25 @@ void require_finite(const TriangleMesh& mesh, bool as_double) {
 std::string ply_bytes(const TriangleMesh& mesh, const PlyOptions& options) {
     require_finite(mesh, options.double_positions);
     LittleEndian file(ply_header(mesh, options));
-    const std::size_t vertex_size =
-        (options.double_positions ? 24u : 12u) + 4 * options.properties.size();
+    const std::size_t vertex_size = (options.double_positions ? 24u : 12u) +
+                                    (mesh.colours.empty() ? 0u : 3u) +
+                                    4 * options.properties.size() + options.byte_properties.size();
+    assert(mesh.colours.empty() || mesh.colours.size() == mesh.positions.size());
     file.reserve(vertex_size * mesh.positions.size() + 13 * mesh.triangles.size());
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         for (const double x : mesh.positions[i]) {
             options.double_positions ? file.f64(x) : file.f32(static_cast<float>(x));
         }
+        if (!mesh.colours.empty()) {
+            for (const std::uint8_t channel : mesh.colours[i]) file.u8(channel);
+        }
         for (const PlyVertexProperty& property : options.properties) {
             assert(property.values.size() == mesh.positions.size());
             file.f32(property.values[i]);
+        }
+        for (const PlyByteProperty& property : options.byte_properties) {
+            assert(property.values.size() == mesh.positions.size());
+            file.u8(property.values[i]);
         }
     }
     for (const Triangle& triangle : mesh.triangles) {

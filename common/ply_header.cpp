@@ -1,6 +1,7 @@
 // common/ply_header.cpp
 #include "common/ply_header.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "common/model_file_check.hpp"
@@ -105,6 +106,26 @@ bool is_index_list(const PlyProperty& property) {
     return property.name == "vertex_indices" || property.name == "vertex_index";
 }
 
+// All three or none; what is no colour after all is no fault either.
+std::array<std::size_t, 3> find_colour(const std::vector<PlyProperty>& columns) {
+    static constexpr std::array<std::string_view, 3> kChannels{"red", "green", "blue"};
+    constexpr std::string_view kPrefix = "diffuse_";
+    std::array<std::size_t, 3> found{kNoColumn, kNoColumn, kNoColumn};
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+        std::string_view name = columns[c].name;
+        if (name.starts_with(kPrefix)) name.remove_prefix(kPrefix.size());
+        const auto channel = std::find(kChannels.begin(), kChannels.end(), name);
+        if (channel == kChannels.end() || columns[c].count) continue;
+        std::size_t& place = found[static_cast<std::size_t>(channel - kChannels.begin())];
+        if (place == kNoColumn) place = c;
+    }
+    constexpr std::array<std::size_t, 3> kNone{kNoColumn, kNoColumn, kNoColumn};
+    if (std::find(found.begin(), found.end(), kNoColumn) != found.end()) return kNone;
+    const PlyScalar type = columns[found[0]].type;
+    const bool alike = columns[found[1]].type == type && columns[found[2]].type == type;
+    return alike && (type == PlyScalar::u8 || is_real(type)) ? found : kNone;
+}
+
 // What OpenMesh 9 reads right without help.
 bool is_plain(const PlyHeader& header, const PlyLayout& layout) {
     if (!header.only_layout || header.elements.size() != 2) return false;
@@ -201,6 +222,7 @@ PlyLayout find_ply_layout(const PlyHeader& header) {
         layout.indices = c;
     }
     if (layout.indices == kNoColumn) throw BadModelFile("faces without one list of vertex indices");
+    layout.colour = find_colour(columns);
     layout.plain = is_plain(header, layout);
     return layout;
 }

@@ -49,9 +49,11 @@ struct PlyLayout {
     const PlyElement* vertex = nullptr;
     const PlyElement* face = nullptr;
     std::array<std::size_t, 3> coordinate{kNoColumn, kNoColumn, kNoColumn};  // columns of x, y, z
-    std::size_t indices = kNoColumn;                                         // column of the face
-    bool float32 = true;                                                     // all coordinates
-    bool plain = false;  // OpenMesh can read the file as it is
+    /// Columns of red, green, blue: all u8, all f32 or all f64; kNoColumn where not all are there.
+    std::array<std::size_t, 3> colour{kNoColumn, kNoColumn, kNoColumn};
+    std::size_t indices = kNoColumn;  // column of the face
+    bool float32 = true;              // all coordinates
+    bool plain = false;               // OpenMesh can read the file as it is
 };
 
 /// Throws BadModelFile when there is no vertex, no face, or not one x, y, z and list of indices.

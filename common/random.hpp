@@ -18,7 +18,11 @@ class Random {
     /// Uniform 64 bits.
     std::uint64_t next() {
         state_ += 0x9e3779b97f4a7c15u;
-        std::uint64_t z = state_;
+        return finalised(state_);
+    }
+
+    /// Its last step alone: a bijection whose every output bit depends on all of z.
+    static std::uint64_t finalised(std::uint64_t z) {
         z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
         z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
         return z ^ (z >> 31);

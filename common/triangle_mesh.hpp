@@ -13,11 +13,15 @@ namespace ellicast::common {
 /// outside.
 using Triangle = std::array<std::uint32_t, 3>;
 
+/// Red green blue.
+using Colour = std::array<std::uint8_t, 3>;
+
 /// An indexed triangle set. It promises nothing about manifoldness; see common/mesh_topology.hpp
 /// for what can be asked of it. Frame and unit: the model's own.
 struct TriangleMesh {
     std::vector<Eigen::Vector3d> positions;
     std::vector<Triangle> triangles;
+    std::vector<Colour> colours{};  // one for each position, or none at all
 };
 
 /// Smallest box that holds all positions; Eigen's empty box when there are none.

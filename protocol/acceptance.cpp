@@ -67,7 +67,7 @@ bool acceptable(const Hint& hint) {
     if (!box_is_plausible(hint) || !topology_is_possible(hint)) return false;
     if (hint.vertices > kMaxVertices) return false;
     if (hint.ellipsoids == 0 && hint.vertices == 0) return false;
-    return hint.format == RecordFormat{};
+    return hint.format.is_known();
 }
 
 RecordBounds::RecordBounds(const Hint& hint) {
@@ -112,12 +112,12 @@ bool RecordBounds::admits_ellipsoids(const std::uint8_t* records, std::size_t co
     return ok;
 }
 
-bool RecordBounds::admits_vertices(const std::uint8_t* records, std::size_t count) const {
+bool RecordBounds::admits_positions(const std::uint8_t* positions, std::size_t count) const {
     constexpr std::size_t kBlock = kBoxBlock / 3;
     const std::size_t blocks = count / kBlock;
-    bool ok = all_inside(records, blocks, vertex_min_, vertex_max_);
+    bool ok = all_inside(positions, blocks, vertex_min_, vertex_max_);
     for (std::size_t k = blocks * kBlock; k < count; ++k) {
-        ok &= admits(load_vertex(records + k * kVertexBytes));
+        ok &= admits(load_position(positions + k * kVertexBytes));
     }
     return ok;
 }
@@ -136,7 +136,7 @@ EllipsoidRecord load_ellipsoid(const std::uint8_t* p) {
     return record;
 }
 
-VertexRecord load_vertex(const std::uint8_t* p) {
+VertexRecord load_position(const std::uint8_t* p) {
     return {.position = {load_f32(p), load_f32(p + 4), load_f32(p + 8)}};
 }
 

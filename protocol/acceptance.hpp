@@ -19,9 +19,10 @@ class RecordBounds {
     [[nodiscard]] bool admits(const EllipsoidRecord& record) const;
     [[nodiscard]] bool admits(const VertexRecord& record) const;
 
-    /// The same for `count` raw records at `records`, in one pass.
+    /// The same for `count` raw records, in one pass; of vertices the positions decide, for any
+    /// tags will do.
     [[nodiscard]] bool admits_ellipsoids(const std::uint8_t* records, std::size_t count) const;
-    [[nodiscard]] bool admits_vertices(const std::uint8_t* records, std::size_t count) const;
+    [[nodiscard]] bool admits_positions(const std::uint8_t* positions, std::size_t count) const;
 
   private:
     BoxBlock vertex_min_;  // x y z, repeated
@@ -31,8 +32,9 @@ class RecordBounds {
     double per_diagonal_ = 1.0;  // 1 / diagonal of the box
 };
 
-/// Decode one raw record. Requires kEllipsoidBytes or kVertexBytes readable bytes.
+/// Decode one raw record, of a vertex what all formats have. Requires kEllipsoidBytes or
+/// kVertexBytes readable bytes.
 EllipsoidRecord load_ellipsoid(const std::uint8_t* p);
-VertexRecord load_vertex(const std::uint8_t* p);
+VertexRecord load_position(const std::uint8_t* p);
 
 }  // namespace ellicast::protocol

@@ -5,6 +5,7 @@
 
 #include "protocol/acceptance.hpp"
 #include "protocol/description.hpp"
+#include "protocol/vertex_tags.hpp"
 
 namespace ellicast::protocol {
 
@@ -46,8 +47,12 @@ constexpr std::uint8_t kFormatColour = 8;
 constexpr std::uint8_t kFormatKnown = 15;
 }  // namespace
 
+bool RecordFormat::is_known() const {
+    return normal_bits == 0 || normal_bits == 8 || normal_bits == 12 || normal_bits == 16;
+}
+
 std::uint8_t RecordFormat::code() const {
-    assert(normal_bits == 0 || normal_bits == 8 || normal_bits == 12 || normal_bits == 16);
+    assert(is_known());
     const int size = normal_bits == 0 ? 0 : normal_bits / 4 - 1;
     return static_cast<std::uint8_t>(size | (ring ? kFormatRing : 0) |
                                      (colour ? kFormatColour : 0));
@@ -68,7 +73,9 @@ EllipsoidRecord SectionView::ellipsoid(std::size_t k) const {
 
 VertexRecord SectionView::vertex(std::size_t k) const {
     assert(kind == SectionKind::vertices && k < count);
-    return load_vertex(body.data() + k * kVertexBytes);
+    VertexRecord record = load_position(body.data() + k * kVertexBytes);
+    if (format != RecordFormat{}) load_tags(format, body, count, k, record);
+    return record;
 }
 
 Description SectionView::description() const {

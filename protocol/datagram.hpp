@@ -35,7 +35,7 @@ inline constexpr double kMinRadius = 1e-6;     // of an ellipsoid, in diagonals;
 inline constexpr double kCenterSlack = 0.05;   // of a centre beyond the box, in diagonals
 
 inline constexpr std::size_t kEllipsoidBytes = 36;
-inline constexpr std::size_t kVertexBytes = 12;
+inline constexpr std::size_t kVertexBytes = 12;         // of the position; tags come on top
 inline constexpr std::size_t kHeaderBytes = 89;         // RTP header, our header and hint
 inline constexpr std::size_t kTrailerBytes = 4;         // CRC-32C
 inline constexpr std::size_t kSectionHeaderBytes = 13;  // of a section of records
@@ -54,7 +54,7 @@ struct EllipsoidRecord {
 struct VertexRecord {
     std::array<float, 3> position{};
     std::uint16_t normal = 0;              // octahedral code of RecordFormat::normal_bits bits
-    std::uint16_t ring = 0;                // of the neighbours in the original mesh
+    std::uint16_t ring = 0;                // of the neighbours in the original mesh; 8 bits
     std::array<std::uint8_t, 3> colour{};  // red green blue
     std::uint8_t unused = 0;
     bool operator==(const VertexRecord&) const = default;
@@ -67,10 +67,30 @@ struct RecordFormat {
     bool colour = false;
     bool operator==(const RecordFormat&) const = default;
 
-    /// The byte on the wire: bits 0-1 the size of the normal, bit 2 ring, bit 3 colour.
+    /// The byte on the wire: bits 0-1 the size of the normal, bit 2 ring, bit 3 colour. Requires
+    /// is_known() (asserted).
     [[nodiscard]] std::uint8_t code() const;
     /// Of an unknown code: one that no acceptable hint has.
     static RecordFormat of_code(std::uint8_t code);
+    [[nodiscard]] bool is_known() const;
+
+    /// Bits of one vertex's normal and ring.
+    [[nodiscard]] std::size_t tag_bits() const {
+        return normal_bits + (ring ? kRingBits : 0);
+    }
+    /// Bytes that the records of `count` vertices take in one section. Of two sections together it
+    /// may be one more than of one with as many vertices.
+    [[nodiscard]] std::size_t vertex_bytes(std::size_t count) const {
+        return count * (kVertexBytes + (colour ? kColourBytes : 0)) + (count * tag_bits() + 7) / 8;
+    }
+    /// The most vertices whose records take at most so many bytes in one section.
+    [[nodiscard]] std::size_t vertices_within(std::size_t bytes) const {
+        // All but the tags are whole bytes, so that rounding the tags up never takes one too many.
+        return 8 * bytes / (8 * (kVertexBytes + (colour ? kColourBytes : 0)) + tag_bits());
+    }
+
+    static constexpr std::size_t kRingBits = 8;
+    static constexpr std::size_t kColourBytes = 3;
 };
 
 /// What every datagram says of the whole object; enough to rebuild it and to check the result.
@@ -143,6 +163,7 @@ std::string_view to_string(WireError error);
 /// A validated section. Records are decoded on access, from the caller's bytes.
 struct SectionView {
     SectionKind kind{};
+    RecordFormat format;       // of vertices
     std::uint32_t first = 0;   // index of record 0
     std::uint32_t stride = 1;  // record k has index first + k * stride
     std::uint16_t count = 0;
@@ -188,7 +209,8 @@ bool acceptable(const EllipsoidRecord& record, const Hint& hint);
 bool acceptable(const VertexRecord& record, const Hint& hint);
 
 /// Builds one datagram of at most `capacity` bytes. It writes what it is told: hint, indices and
-/// records are the caller's to keep acceptable.
+/// records are the caller's to keep acceptable. Of a vertex it writes what the hint's record format
+/// has, and of a tag as many bits as it has there.
 class DatagramWriter {
   public:
     /// Requires kMinDatagramBytes <= capacity <= kMaxDatagramBytes (asserted).
@@ -215,8 +237,10 @@ class DatagramWriter {
 
   private:
     [[nodiscard]] std::size_t free_bytes() const;
+    [[nodiscard]] std::size_t record_room() const;  // bytes of records in a new section
 
     std::vector<std::uint8_t> bytes_;
+    RecordFormat format_;
     std::size_t capacity_;
     std::size_t sections_ = 0;
 };

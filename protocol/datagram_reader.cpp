@@ -7,6 +7,7 @@
 #include "protocol/crc32c.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/description.hpp"
+#include "protocol/vertex_tags.hpp"
 #include "protocol/wire_layout.hpp"
 
 namespace ellicast::protocol {
@@ -81,7 +82,7 @@ bool admits_all(const RecordBounds& bounds, const SectionView& section) {
     if (section.kind == SectionKind::ellipsoids) {
         return bounds.admits_ellipsoids(section.body.data(), section.count);
     }
-    return bounds.admits_vertices(section.body.data(), section.count);
+    return bounds.admits_positions(section.body.data(), section.count);
 }
 
 /// A section of records: its place in the index space, then the records themselves.
@@ -91,12 +92,17 @@ Fault read_records(Bytes body, const Hint& hint, const RecordBounds& bounds, Sec
     section.first = reader.u32();
     section.stride = reader.u32();
     section.body = reader.bytes(reader.left());
-    const std::size_t wanted = section.count * record_bytes(section.kind);
+    section.format = hint.format;
+    const bool vertices = section.kind == SectionKind::vertices;
+    const std::size_t wanted =
+        vertices ? hint.format.vertex_bytes(section.count) : section.count * kEllipsoidBytes;
     if (reader.failed() || section.count == 0 || section.body.size() != wanted) {
         return WireError::bad_section;
     }
-    const std::uint64_t total =
-        section.kind == SectionKind::ellipsoids ? hint.ellipsoids : hint.vertices;
+    if (vertices && !padding_is_zero(hint.format, section.body, section.count)) {
+        return WireError::bad_section;
+    }
+    const std::uint64_t total = vertices ? hint.vertices : hint.ellipsoids;
     // 64 bits: (2^16 - 1) * (2^32 - 1) + 2^32 - 1 does not overflow.
     const std::uint64_t last = section.first + (section.count - std::uint64_t{1}) * section.stride;
     if (section.stride == 0 || last >= total) return WireError::index_out_of_range;

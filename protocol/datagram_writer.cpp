@@ -7,6 +7,7 @@
 #include "protocol/crc32c.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/description.hpp"
+#include "protocol/vertex_tags.hpp"
 #include "protocol/wire_layout.hpp"
 
 namespace ellicast::protocol {
@@ -45,33 +46,14 @@ void write_header(ByteWriter& writer, const DatagramHeader& header) {
     writer.u32(header.datagrams);
 }
 
-std::span<const float> scalars(const EllipsoidRecord& record) {
-    return record.scalars;
-}
-std::span<const float> scalars(const VertexRecord& record) {
-    return record.position;
-}
-
-template <class Record>
-void write_records(std::vector<std::uint8_t>& bytes, SectionKind kind, std::uint32_t first,
-                   std::uint32_t stride, std::span<const Record> records) {
-    const std::size_t length = kIndexBytes + records.size() * record_bytes(kind);
-    ByteWriter writer(bytes);
+/// In front of the records: `bytes` is what they take.
+void write_section_header(ByteWriter& writer, SectionKind kind, std::uint32_t first,
+                          std::uint32_t stride, std::size_t count, std::size_t bytes) {
     writer.u8(static_cast<std::uint8_t>(kind));
-    writer.u16(static_cast<std::uint16_t>(length));
-    writer.u16(static_cast<std::uint16_t>(records.size()));
+    writer.u16(static_cast<std::uint16_t>(kIndexBytes + bytes));
+    writer.u16(static_cast<std::uint16_t>(count));
     writer.u32(first);
     writer.u32(stride);
-    for (const Record& record : records) {
-        for (const float x : scalars(record)) writer.f32(x);
-    }
-}
-
-/// Records of this many bytes that fit into a new section.
-std::size_t records_that_fit(std::size_t free_bytes, std::size_t sections, std::size_t each) {
-    if (sections == kMaxSections || free_bytes < kSectionHeaderBytes) return 0;
-    const std::size_t body = std::min<std::size_t>(free_bytes - kKindAndLengthBytes, 0xffff);
-    return (body - kIndexBytes) / each;
 }
 
 }  // namespace
@@ -89,7 +71,7 @@ std::array<std::uint8_t, kCanonicalHintBytes> canonical_bytes(const Hint& hint) 
 }
 
 DatagramWriter::DatagramWriter(const DatagramHeader& header, std::size_t capacity)
-    : capacity_(capacity) {
+    : format_(header.hint.format), capacity_(capacity) {
     assert(capacity >= kMinDatagramBytes && capacity <= kMaxDatagramBytes);
     bytes_.reserve(capacity);
     ByteWriter writer(bytes_);
@@ -101,25 +83,41 @@ std::size_t DatagramWriter::free_bytes() const {
     return capacity_ - kTrailerBytes - bytes_.size();
 }
 
+std::size_t DatagramWriter::record_room() const {
+    if (sections_ == kMaxSections || free_bytes() < kSectionHeaderBytes) return 0;
+    return std::min<std::size_t>(free_bytes() - kKindAndLengthBytes, 0xffff) - kIndexBytes;
+}
+
 std::size_t DatagramWriter::ellipsoids_that_fit() const {
-    return records_that_fit(free_bytes(), sections_, kEllipsoidBytes);
+    return record_room() / kEllipsoidBytes;
 }
 
 std::size_t DatagramWriter::vertices_that_fit() const {
-    return records_that_fit(free_bytes(), sections_, kVertexBytes);
+    return format_.vertices_within(record_room());
 }
 
 void DatagramWriter::add_ellipsoids(std::uint32_t first, std::uint32_t stride,
                                     std::span<const EllipsoidRecord> records) {
     assert(!records.empty() && records.size() <= ellipsoids_that_fit());
-    write_records(bytes_, SectionKind::ellipsoids, first, stride, records);
+    ByteWriter writer(bytes_);
+    write_section_header(writer, SectionKind::ellipsoids, first, stride, records.size(),
+                         records.size() * kEllipsoidBytes);
+    for (const EllipsoidRecord& record : records) {
+        for (const float x : record.scalars) writer.f32(x);
+    }
     ++sections_;
 }
 
 void DatagramWriter::add_vertices(std::uint32_t first, std::uint32_t stride,
                                   std::span<const VertexRecord> records) {
     assert(!records.empty() && records.size() <= vertices_that_fit());
-    write_records(bytes_, SectionKind::vertices, first, stride, records);
+    ByteWriter writer(bytes_);
+    write_section_header(writer, SectionKind::vertices, first, stride, records.size(),
+                         format_.vertex_bytes(records.size()));
+    for (const VertexRecord& record : records) {
+        for (const float x : record.position) writer.f32(x);
+    }
+    write_tags(format_, records, writer);
     ++sections_;
 }
 

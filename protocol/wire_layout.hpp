@@ -31,11 +31,4 @@ static_assert(kHeaderBytes == kRoundOffset + 16);
 static_assert(kSectionHeaderBytes == kKindAndLengthBytes + kIndexBytes);
 static_assert(kCanonicalHintBytes == kHintBytes + 1);
 
-/// Bytes of one record of a section of this kind; 0 for kinds that hold no records.
-constexpr std::size_t record_bytes(SectionKind kind) {
-    if (kind == SectionKind::ellipsoids) return kEllipsoidBytes;
-    if (kind == SectionKind::vertices) return kVertexBytes;
-    return 0;
-}
-
 }  // namespace ellicast::protocol

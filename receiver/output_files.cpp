@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cerrno>
 #include <cmath>
@@ -12,6 +13,7 @@
 #include <system_error>
 
 #include "common/model_io.hpp"
+#include "receiver/vertex_colours.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -67,6 +69,22 @@ common::PlyOptions ply_options(const Reconstruction& reconstruction, const Recei
     common::PlyOptions options;
     options.double_positions = needs_double(reconstruction);
     options.comment = "ellicast object " + id_text(object.id);
+    return options;
+}
+
+/// With what the result's vertices have beside positions.
+common::PlyOptions result_options(const Reconstruction& reconstruction,
+                                  const ReceivedObject& object) {
+    common::PlyOptions options = ply_options(reconstruction, object);
+    const std::vector<common::Colour> colours = vertex_colours(reconstruction, object);
+    if (colours.empty()) return options;
+    constexpr std::array<const char*, 3> kChannels{"red", "green", "blue"};
+    for (std::size_t k = 0; k < kChannels.size(); ++k) {
+        common::PlyByteProperty& property = options.byte_properties.emplace_back();
+        property.name = kChannels[k];
+        property.values.reserve(colours.size());
+        for (const common::Colour& colour : colours) property.values.push_back(colour[k]);
+    }
     return options;
 }
 
@@ -131,7 +149,7 @@ void check_writable_directory(const fs::path& path) {
 
 void write_mesh(const fs::path& path, const Reconstruction& reconstruction,
                 const ReceivedObject& object) {
-    common::write_ply(path, reconstruction.mesh, ply_options(reconstruction, object));
+    common::write_ply(path, reconstruction.mesh, result_options(reconstruction, object));
 }
 
 void write_stages(const fs::path& directory, const Reconstruction& reconstruction,
@@ -142,7 +160,8 @@ void write_stages(const fs::path& directory, const Reconstruction& reconstructio
     common::write_ply(directory / "1-ellipsoids.ply", stages.ellipsoids, options);
     common::write_ply(directory / "2-marching-cubes.ply", stages.marching_cubes, options);
     common::write_ply(directory / "3-halfway.ply", stages.halfway, options);
-    common::write_ply(directory / "4-final.ply", reconstruction.mesh, options);
+    common::write_ply(directory / "4-final.ply", reconstruction.mesh,
+                      result_options(reconstruction, object));
 }
 
 }  // namespace ellicast::receiver

@@ -35,7 +35,8 @@ void check_writable_file(const std::filesystem::path& path);
 void check_writable_directory(const std::filesystem::path& path);
 
 /// Writes the result; float32 unless that would move a received vertex (a large origin), double
-/// then. Atomic. Throws common::ModelError.
+/// then; with uchar red, green, blue when the object has colours (receiver/vertex_colours.hpp).
+/// Atomic. Throws common::ModelError.
 void write_mesh(const std::filesystem::path& path, const Reconstruction& reconstruction,
                 const ReceivedObject& object);
 

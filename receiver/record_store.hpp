@@ -21,7 +21,7 @@ struct StoreLimits {
     std::uint32_t vertices = 1u << 25;  // of one object; an object that hints more is not taken in
     /// Records of all groups together. One group gets half (MemoryBudget): enough for 2^25
     /// vertices.
-    std::size_t bytes = std::size_t{1} << 30;
+    std::size_t bytes = std::size_t{3} << 29;
 };
 
 /// One sender instance, as its datagrams name it.

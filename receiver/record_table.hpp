@@ -38,6 +38,18 @@ class MemoryBudget {
     std::size_t used_ = 0;
 };
 
+/// Keys that compare as the records' canonical bytes do (WIRE_FORMAT.md section 7), whatever the
+/// machine.
+inline std::array<std::uint32_t, 9> order_of(const protocol::EllipsoidRecord& record) {
+    return std::bit_cast<std::array<std::uint32_t, 9>>(record.scalars);
+}
+inline std::array<std::uint32_t, 5> order_of(const protocol::VertexRecord& record) {
+    const auto [x, y, z] = std::bit_cast<std::array<std::uint32_t, 3>>(record.position);
+    const auto& [red, green, blue] = record.colour;
+    return {x, y, z, std::uint32_t{record.normal} << 16 | record.ring,
+            std::uint32_t{red} << 16 | std::uint32_t{green} << 8 | blue};
+}
+
 enum class Insertion {
     fresh,        // the index was not there
     same,         // it was, with the same bits
@@ -86,9 +98,6 @@ class RecordTable {
     // A red-black node: three pointers and a colour, the pair, and the allocator's own 16 bytes.
     static constexpr std::size_t kSparseBytes = 48 + sizeof(std::pair<const std::uint32_t, Entry>);
 
-    static auto order_of(const Record& record) {  // as the big-endian bytes compare
-        return std::bit_cast<std::array<std::uint32_t, sizeof(Record) / 4>>(record);
-    }
     static std::uint64_t bit(std::uint32_t index) { return std::uint64_t{1} << (index % 64); }
     [[nodiscard]] std::size_t words() const { return (std::size_t{expected_} + 63) / 64; }
     [[nodiscard]] std::size_t dense_bytes() const {

@@ -37,6 +37,12 @@ Json hint_json(const ReportContent& content) {
             {"approximate", hint.approximate}};
 }
 
+Json record_format_json(const ReportContent& content) {
+    if (!content.object) return nullptr;
+    const protocol::RecordFormat& format = content.object->hint.format;
+    return {{"normal_bits", format.normal_bits}, {"ring", format.ring}, {"colour", format.colour}};
+}
+
 std::uint64_t lost_in_network(const ReportContent& content) {
     const std::uint64_t lost = content.session.datagrams.lost;
     return lost - std::min(lost, content.kernel_dropped);
@@ -161,6 +167,7 @@ nlohmann::ordered_json make_report(const ReportContent& content) {
     report["output"] = content.output.empty() ? Json(nullptr) : Json(content.output);
     report["object"] = object_json(content);
     report["hint"] = hint_json(content);
+    report["record_format"] = record_format_json(content);
     report["datagrams"] = datagrams_json(content);
     add_records(content, report);
     add_mesh(content, report);

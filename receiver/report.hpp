@@ -37,6 +37,7 @@ struct ReportContent {
 ///   object        {id, name, unit, complete, id_verified}, or null when nothing was received
 ///                 complete: every record is there; id_verified: and they are those of the id
 ///   hint          {box_min, box_max, components, euler_all, euler_largest, approximate}, or null
+///   record_format {normal_bits, ring, colour}: of vertices beside the position, or null
 ///   datagrams     {received, lost, duplicate, reordered, bytes}: of the object's streams;
 ///                   received - duplicate + lost = sent while we listened
 ///                 {malformed, kernel_dropped}: of all that came

@@ -190,6 +190,8 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     records.reserve(model.vertices.size());
     for (const Eigen::Vector3d& x : model.vertices) records.push_back(vertex_record(x, origin));
     object.vertices = in_spread_order(without_repeats(records), options.seed);
+    object.hint.format = record_format(options.tags, model);
+    set_tags(object.hint.format, model, records, object.vertices);
 
     object.hint.components = promise.components;
     object.hint.euler_all = promise.euler_all;

@@ -8,6 +8,7 @@
 #include "protocol/datagram.hpp"
 #include "sender/decomposition.hpp"
 #include "sender/model_preparation.hpp"
+#include "sender/vertex_tags.hpp"
 
 namespace ellicast::sender {
 
@@ -24,14 +25,15 @@ struct BroadcastObject {
 struct ObjectOptions {
     std::string name;
     std::uint64_t seed = 1;
+    TagOptions tags{};
 };
 
 /// Turns geometry into records: subtracts the origin (zero unless the box lies far from it; chosen
 /// so that float32 input survives bit for bit), rounds to float32, merges vertices that become
-/// equal, orders the vertices, drops ellipsoids that no receiver would accept, fills hint, id and
-/// description. The hinted box is that of the rounded records. Throws std::invalid_argument with a
-/// one-line reason when no vertex or no ellipsoid remains, or when size, counts or topology exceed
-/// what the wire can say.
+/// equal, orders the vertices, gives them their tags, drops ellipsoids that no receiver would
+/// accept, fills hint, id and description. The hinted box is that of the rounded records. Throws
+/// std::invalid_argument with a one-line reason when no vertex or no ellipsoid remains, or when
+/// size, counts or topology exceed what the wire can say.
 BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
                             const Decomposition& decomposition, const ObjectOptions& options);
 

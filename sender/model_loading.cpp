@@ -103,7 +103,7 @@ Decomposed decomposed(const fs::path& path, const DecompositionOptions& options,
 }  // namespace
 
 LoadedModel load_model(const fs::path& path, const DecompositionOptions& options,
-                       const std::optional<fs::path>& cache) {
+                       const std::optional<fs::path>& cache, const TagOptions& tags) {
     LoadedModel loaded;
     const Decomposed source = decomposed(path, options, cache, loaded);
     loaded.promise = timed(loaded.stages, "promise",
@@ -111,7 +111,7 @@ LoadedModel load_model(const fs::path& path, const DecompositionOptions& options
     loaded.object = timed(loaded.stages, "object", [&] {
         return naming(path, [&] {
             return make_object(source.model, loaded.promise, source.decomposition,
-                               {path.stem().string(), options.seed});
+                               {path.stem().string(), options.seed, tags});
         });
     });
     if (loaded.promise.approximate) {

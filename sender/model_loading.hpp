@@ -36,7 +36,8 @@ struct LoadedModel {
 /// when it cannot be used, that is a warning. Throws common::ModelError, one line that names the
 /// path and the reason.
 LoadedModel load_model(const std::filesystem::path& path, const DecompositionOptions& options,
-                       const std::optional<std::filesystem::path>& cache);
+                       const std::optional<std::filesystem::path>& cache,
+                       const TagOptions& tags = {});
 
 /// The same up to the decomposition, which is written to `output`. Throws common::ModelError.
 LoadedModel decompose_to_file(const std::filesystem::path& path,

@@ -59,6 +59,21 @@ void warn_of_parts(const OrientedParts& parts, Warnings& warnings) {
     warnings.add(parts.flat, "1 part encloses no volume", "# parts enclose no volume");
 }
 
+Eigen::Vector3d area_vector(const std::vector<Eigen::Vector3d>& positions,
+                            const common::Triangle& t) {
+    return (positions[t[1]] - positions[t[0]]).cross(positions[t[2]] - positions[t[0]]);
+}
+
+/// Repair keeps a triangle's place, or puts a part of it there, but may turn it and give it copies
+/// of its corners.
+void turn_like(const common::TriangleMesh& solid, const std::vector<Eigen::Vector3d>& vertices,
+               std::vector<common::Triangle>& faces) {
+    for (std::size_t t = 0; t < faces.size(); ++t) {
+        const Eigen::Vector3d turned = area_vector(solid.positions, solid.triangles[t]);
+        if (turned.dot(area_vector(vertices, faces[t])) < 0.0) std::swap(faces[t][1], faces[t][2]);
+    }
+}
+
 }  // namespace
 
 PreparedModel prepare_model(const common::TriangleMesh& input) {
@@ -72,10 +87,13 @@ PreparedModel prepare_model(const common::TriangleMesh& input) {
 
     PreparedModel model;
     model.vertices = clean.mesh.positions;
+    model.faces = clean.mesh.triangles;
+    model.colours = std::exchange(clean.mesh.colours, {});
     model.solid = std::move(clean.mesh);
     warn_of_repair(make_closed_manifold(model.solid), warnings);
     const OrientedParts parts = orient_parts(model.solid, common::triangle_components(model.solid));
     warn_of_parts(parts, warnings);
+    turn_like(model.solid, model.vertices, model.faces);
 
     const double diagonal = common::bounding_box(model.vertices).diagonal().norm();
     if (!(parts.volume > kLeastVolume * diagonal * diagonal * diagonal)) {

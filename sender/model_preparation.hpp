@@ -15,10 +15,16 @@ struct PreparedModel {
     /// The user's vertices that a triangle uses, in file order; exact duplicates of a position kept
     /// once. These are what is sent.
     std::vector<Eigen::Vector3d> vertices;
+    /// Red green blue, one for each of `vertices`; empty when the input has none. Of duplicates the
+    /// first's.
+    std::vector<common::Colour> colours;
     /// Closed and consistently oriented (outward): the input with boundary loops capped and
     /// non-manifold places split. The first vertices.size() positions are `vertices`, copies and
     /// cap centres follow; all are used.
     common::TriangleMesh solid;
+    /// The user's triangles as far as they say something of the shape (no caps), corners in
+    /// `vertices`, turned as `solid` has them.
+    std::vector<common::Triangle> faces;
     /// What was done to get there, one line each, for the user ("filled 5 holes", ...).
     std::vector<std::string> warnings;
 };

@@ -35,6 +35,8 @@ constexpr const char* kIdentityGroup = "Identity of the stream (random unless gi
 struct Texts {
     std::string to;
     std::string criterion = "robust";
+    std::string tags = "8";
+    std::string colour = "on";
     std::string rate = "20M";
     std::string rounds = "1";
     std::string cache;
@@ -45,6 +47,20 @@ struct Texts {
 
 std::uint64_t rate_of(const std::string& text) {
     return text == "0" ? 0 : common::parse_rate(text);
+}
+
+/// BITS, or BITS+ring.
+TagOptions tags_of(const std::string& text) {
+    constexpr std::string_view kRing = "+ring";
+    TagOptions tags;
+    tags.ring = text.ends_with(kRing);
+    const auto bits = common::number<unsigned>(
+        std::string_view(text).substr(0, text.size() - (tags.ring ? kRing.size() : 0)));
+    if (!bits || (*bits != 0 && *bits != 8 && *bits != 12 && *bits != 16)) {
+        throw common::refusal(text, "is not 0, 8, 12 or 16, with or without '+ring' behind it");
+    }
+    tags.normal_bits = static_cast<int>(*bits);
+    return tags;
 }
 
 std::uint32_t rounds_of(const std::string& text) {
@@ -124,6 +140,16 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
                    "How to select them: volume, or robust against loss")
         ->type_name("RULE")
         ->check(CLI::IsMember(kCriteria).description(""))
+        ->capture_default_str();
+    app.add_option("--tags", texts.tags,
+                   "Bits of a normal with every vertex: 0, 8, 12 or 16; '+ring' behind them adds a "
+                   "byte about its neighbours")
+        ->type_name("BITS[+ring]")
+        ->check(accepted_by(tags_of))
+        ->capture_default_str();
+    app.add_option("--colour", texts.colour, "Colours of vertices, where the model has them")
+        ->type_name("on|off")
+        ->check(CLI::IsMember(std::vector<std::string>{"on", "off"}).description(""))
         ->capture_default_str();
     add_number<std::uint64_t>(
         app, "--seed", geometry.seed, 0, std::numeric_limits<std::uint64_t>::max(),
@@ -208,6 +234,8 @@ void interpret(const Texts& texts, Options& options) {
     };
     options.decomposition.criterion =
         texts.criterion == "volume" ? Criterion::volume : Criterion::robust;
+    options.tags = tags_of(texts.tags);
+    options.tags.colour = texts.colour == "on";
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);

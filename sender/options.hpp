@@ -12,6 +12,7 @@
 #include "common/loss_model.hpp"
 #include "protocol/datagram.hpp"
 #include "sender/decomposition.hpp"
+#include "sender/vertex_tags.hpp"
 
 namespace ellicast::sender {
 
@@ -28,6 +29,7 @@ struct Options {
     std::vector<std::filesystem::path> models;  // at least one
     std::string host;                           // "" only with decompose_only
     std::uint16_t port = 5004;
+    TagOptions tags;
     DecompositionOptions decomposition;  // its seed and threads are the program's
     std::size_t copies = 3;
     std::uint64_t bits_per_second = 20'000'000;  // 0: as fast as the socket takes them

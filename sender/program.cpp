@@ -30,10 +30,11 @@ void log_model(const LoadedModel& model) {
 std::vector<LoadedModel> load_models(const Options& options) {
     std::vector<LoadedModel> models;
     for (const std::filesystem::path& path : options.models) {
-        models.push_back(options.decompose_only
-                             ? decompose_to_file(path, options.decomposition, options.cache,
-                                                 *options.decompose_only)
-                             : load_model(path, options.decomposition, options.cache));
+        models.push_back(
+            options.decompose_only
+                ? decompose_to_file(path, options.decomposition, options.cache,
+                                    *options.decompose_only)
+                : load_model(path, options.decomposition, options.cache, options.tags));
         log_model(models.back());
     }
     return models;

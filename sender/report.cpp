@@ -29,6 +29,9 @@ ordered_json object_json(const LoadedModel& model, const RoundPlan& plan) {
     json["object_id"] = hex(object.id);
     json["vertices"] = object.vertices.size();
     json["ellipsoids"] = object.ellipsoids.size();
+    json["record_format"] = {{"normal_bits", object.hint.format.normal_bits},
+                             {"ring", object.hint.format.ring},
+                             {"colour", object.hint.format.colour}};
     json["copies"] = plan.copies();
     json["datagrams"] = plan.datagrams();
     json["origin"] = object.description.origin;

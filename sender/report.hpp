@@ -33,8 +33,9 @@ double achieved_rate(const SendOutcome& outcome);
 ///   models[]: one object each
 ///     model          path as given
 ///     name           as broadcast
-///     object_id      16 hex digits; this and the next five keys are absent after --decompose-only
+///     object_id      16 hex digits; this and the next six keys are absent after --decompose-only
 ///     vertices, ellipsoids   distinct records
+///     record_format  {normal_bits, ring, colour}: what a vertex holds beside its position
 ///     copies         of every ellipsoid in a round
 ///     datagrams      in a round
 ///     origin         [x, y, z] subtracted before the wire

@@ -5,14 +5,11 @@
 #include <cassert>
 #include <numeric>
 
-#include "protocol/datagram.hpp"
-
 namespace ellicast::sender {
 namespace {
 
 using protocol::kEllipsoidBytes;
 using protocol::kSectionHeaderBytes;
-using protocol::kVertexBytes;
 
 // DESIGN section 5: whoever joins late has a shape at once.
 constexpr std::uint32_t kSectionEvery = 8;
@@ -114,7 +111,9 @@ void set_groups(RoundLayout& layout, std::vector<std::uint32_t> groups) {
 /// Vertices that fit into one datagram beside everything else in it.
 std::uint32_t vertex_room(const LayoutSizes& sizes, const RoundLayout& layout,
                           std::uint32_t ordinal) {
-    std::size_t taken = sizes.vertex_sections * kSectionHeaderBytes;
+    // Two sections may end in padding where one would not.
+    std::size_t taken = sizes.vertex_sections * (kSectionHeaderBytes + 1) - 1;
+    if (sizes.format.tag_bits() % 8 == 0) taken = sizes.vertex_sections * kSectionHeaderBytes;
     if (ordinal % sizes.description_interval == 0) taken += sizes.description;
     if (const auto run = layout.ellipsoids_at(ordinal, 0)) {
         // Another rotation may put a class with one more record here.
@@ -123,7 +122,7 @@ std::uint32_t vertex_room(const LayoutSizes& sizes, const RoundLayout& layout,
     }
     return taken >= sizes.payload
                ? 0
-               : static_cast<std::uint32_t>((sizes.payload - taken) / kVertexBytes);
+               : static_cast<std::uint32_t>(sizes.format.vertices_within(sizes.payload - taken));
 }
 
 std::uint64_t room_in_all(const LayoutSizes& sizes, const RoundLayout& layout) {
@@ -149,7 +148,7 @@ void share_vertices(const LayoutSizes& sizes, RoundLayout& layout) {
 
 /// The next body length to try when `room` is too little.
 std::uint32_t lengthen(const LayoutSizes& sizes, std::uint32_t body, std::uint64_t room) {
-    const std::uint64_t each = (sizes.payload - kSectionHeaderBytes) / kVertexBytes;
+    const std::uint64_t each = sizes.format.vertices_within(sizes.payload - kSectionHeaderBytes);
     const std::uint64_t missing = sizes.vertices - room;
     return body + static_cast<std::uint32_t>(std::max<std::uint64_t>(1, missing / each));
 }

@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "protocol/datagram.hpp"
+
 namespace ellicast::sender {
 
 /// What a layout depends on. Sizes in bytes.
@@ -15,6 +17,7 @@ struct LayoutSizes {
     std::uint32_t description_interval = 1;  // datagrams from one description to the next
     std::uint32_t ellipsoids = 0;
     std::uint32_t vertices = 0;
+    protocol::RecordFormat format;    // of the vertices
     std::size_t copies = 1;           // of every ellipsoid, at least; 1: exactly once
     std::size_t vertex_sections = 1;  // of one datagram: headers to leave room for
 };

@@ -15,7 +15,6 @@ using protocol::kEllipsoidBytes;
 using protocol::kHeaderBytes;
 using protocol::kSectionHeaderBytes;
 using protocol::kTrailerBytes;
-using protocol::kVertexBytes;
 
 constexpr std::uint32_t kDescriptionEvery = 64;          // datagrams, DESIGN section 5
 constexpr std::uint64_t kDescriptionEveryPerSecond = 5;  // 200 ms, DESIGN section 5
@@ -113,13 +112,14 @@ RoundPlan::RoundPlan(BroadcastObject object, const PlanOptions& options)
     sizes.description_interval = description_interval_;
     sizes.ellipsoids = static_cast<std::uint32_t>(object_.ellipsoids.size());
     sizes.vertices = static_cast<std::uint32_t>(object_.vertices.size());
+    sizes.format = object_.hint.format;
     sizes.copies = options.copies;
 
     // In later rounds a datagram may hold the end of one class and the beginning of the next.
     sizes.vertex_sections = options.rounds == 1 ? 1 : 2;
     layout_ = lay_out(sizes);
     // No class is shorter than a datagram's vertices, so that it holds parts of two at most.
-    const std::size_t most = (sizes.payload - kSectionHeaderBytes) / kVertexBytes;
+    const std::size_t most = sizes.format.vertices_within(sizes.payload - kSectionHeaderBytes);
     largest_stride_ =
         static_cast<std::uint32_t>(std::max<std::size_t>(1, object_.vertices.size() / most));
 }

@@ -185,9 +185,11 @@ void compact(TriangleMesh& mesh) {
     for (std::size_t v = 0; v < used.size(); ++v) {
         if (!used[v]) continue;
         mesh.positions[count] = mesh.positions[v];
+        if (!mesh.colours.empty()) mesh.colours[count] = mesh.colours[v];
         renamed[v] = count++;
     }
     mesh.positions.resize(count);
+    if (!mesh.colours.empty()) mesh.colours.resize(count);
     for (Triangle& triangle : mesh.triangles) {
         for (std::uint32_t& v : triangle) v = renamed[v];
     }

@@ -30,6 +30,16 @@ Bytes vertices_only() {
     return writer.finish();
 }
 
+/// Nine vertices of every tag: the stream of bits ends within a byte.
+Bytes tagged_vertices(std::uint8_t normal_bits) {
+    Random random(4);
+    const DatagramHeader header =
+        sample_header(RecordFormat{.normal_bits = normal_bits, .ring = true, .colour = true});
+    DatagramWriter writer(header, kMinDatagramBytes);
+    writer.add_vertices(49'000, 100, random_vertices(9, header.hint, random));
+    return writer.finish();
+}
+
 Bytes description_only() {
     DatagramHeader header = sample_header();
     header.rounds = 0;
@@ -69,6 +79,9 @@ int main(int argc, char** argv) {
     }
     const std::filesystem::path folder = argv[1];
     const bool written = write(folder, "golden", from_hex(kGoldenHex)) &&
+                         write(folder, "golden-tagged", from_hex(kGoldenTaggedHex)) &&
+                         write(folder, "tagged-12", tagged_vertices(12)) &&
+                         write(folder, "tagged-16", tagged_vertices(16)) &&
                          write(folder, "ellipsoids", ellipsoids_only()) &&
                          write(folder, "vertices", vertices_only()) &&
                          write(folder, "description", description_only()) &&

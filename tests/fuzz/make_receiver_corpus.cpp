@@ -42,6 +42,17 @@ ReceiverScript whole_object() {
     return script;
 }
 
+/// Two senders of one sphere: with all tags, and later with others.
+ReceiverScript tagged_objects() {
+    ReceiverScript script{.set_up = 1, .steps = {}};
+    MadeObject object = made_sphere(40, 5);
+    add_tags(object, {.normal_bits = 12, .ring = true, .colour = true});
+    append(script, made_datagrams(object, small_stream(1)), kFixChecksum);
+    add_tags(object, {.normal_bits = 8});
+    append(script, made_datagrams(object, small_stream(1)), kFixChecksum | pause(1));
+    return script;
+}
+
 ReceiverScript rounds_with_loss() {
     ReceiverScript script{.set_up = 2 | 4, .steps = {}};
     append(script, made_datagrams(made_sphere(60, 4), small_stream(1, 2)),
@@ -99,7 +110,8 @@ int main(int argc, char** argv) {
                          write(folder, "rounds-with-loss", rounds_with_loss()) &&
                          write(folder, "restarted-sender", restarted_sender()) &&
                          write(folder, "strangers", strangers_in_little_room()) &&
-                         write(folder, "contradictions", contradictions());
+                         write(folder, "contradictions", contradictions()) &&
+                         write(folder, "tagged-objects", tagged_objects());
     if (!written) std::fprintf(stderr, "make_receiver_corpus: cannot write to %s\n", argv[1]);
     return written ? 0 : 2;
 }

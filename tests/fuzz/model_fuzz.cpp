@@ -28,6 +28,14 @@ void check_prepared(const TriangleMesh& mesh) {
         const ellicast::common::MeshTopology topology =
             ellicast::common::analyse_topology(model.solid);
         if (!topology.closed || !topology.manifold) fail("a solid is a closed manifold");
+        for (const ellicast::common::Triangle& face : model.faces) {
+            for (const std::uint32_t v : face) {
+                if (v >= model.vertices.size()) fail("faces are of the user's vertices");
+            }
+        }
+        if (model.colours.size() != (mesh.colours.empty() ? 0 : model.vertices.size())) {
+            fail("every vertex keeps its colour");
+        }
         for (const Eigen::Vector3d& p : model.solid.positions) {
             if (!p.allFinite()) fail("a solid is finite");
         }
@@ -53,6 +61,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             for (const std::uint32_t v : triangle) {
                 if (v >= mesh.positions.size()) fail("indices are in range");
             }
+        }
+        if (!mesh.colours.empty() && mesh.colours.size() != mesh.positions.size()) {
+            fail("all vertices have colours or none");
         }
         check_prepared(mesh);
     } catch (const ellicast::common::ModelError& error) {

@@ -19,9 +19,10 @@ using ellicast::tests::ReceiverScript;
 using ellicast::tests::ScriptStep;
 
 // Where header and first section have numbers (WIRE_FORMAT.md): offset and width.
-constexpr std::array<std::pair<std::size_t, std::size_t>, 20> kFields{{
-    {2, 2},  {4, 4},  {8, 4},  {13, 1}, {14, 8}, {22, 8}, {30, 4}, {42, 4}, {54, 4}, {58, 4},
-    {62, 4}, {66, 2}, {68, 4}, {73, 4}, {77, 4}, {81, 4}, {85, 4}, {90, 2}, {92, 2}, {94, 4},
+constexpr std::array<std::pair<std::size_t, std::size_t>, 21> kFields{{
+    {2, 2},  {4, 4},  {8, 4},  {13, 1}, {14, 8}, {22, 8}, {30, 4},
+    {42, 4}, {54, 4}, {58, 4}, {62, 4}, {66, 2}, {68, 4}, {72, 1},
+    {73, 4}, {77, 4}, {81, 4}, {85, 4}, {90, 2}, {92, 2}, {94, 4},
 }};
 
 void set_number(std::vector<std::uint8_t>& bytes, Random& random) {

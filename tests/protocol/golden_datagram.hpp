@@ -56,6 +56,43 @@ inline constexpr const char* kGoldenHex =
     "c7 5f 05 47";  // CRC-32C
 // clang-format on
 
+/// One of tagged vertices under the same header but for the record format.
+inline constexpr const char* kGoldenTaggedHex =
+    // clang-format off
+    "80 "  // RTP version 2, no padding, extension or sources
+    "e0 "  // marker, payload type 96
+    "ff fe "  // sequence
+    "01 02 03 04 "  // timestamp
+    "de ad be ef "  // SSRC
+    "01 "  // version
+    "01 "  // flags: approximate
+    "10 11 12 13 14 15 16 17 "  // session
+    "a0 a1 a2 a3 a4 a5 a6 a7 "  // object
+    "bf 80 00 00 c0 00 00 00 bf 00 00 00 "  // box, least corner: -1 -2 -0.5
+    "3f 80 00 00 40 00 00 00 40 80 00 00 "  // box, greatest corner: 1 2 4
+    "00 00 00 02 "  // components
+    "ff ff ff fc "  // Euler characteristic, all
+    "ff ff ff fa "  // of the largest component
+    "01 90 "  // ellipsoids
+    "00 00 bd 65 "  // vertices
+    "0e "  // record format: normals of 12 bits, ring, colour
+    "00 00 00 03 "  // round
+    "00 00 00 05 "  // rounds
+    "00 00 02 7f "  // ordinal
+    "00 00 02 80 "  // datagrams
+    "02 "  // vertices
+    "00 3f "  // length
+    "00 03 "  // count
+    "00 00 00 00 "  // first
+    "00 00 00 01 "  // stride
+    "3f 80 00 00 c0 00 00 00 40 80 00 00 "  // position 0: 1 -2 4
+    "bf 80 00 00 3d cc cc cd 40 50 00 00 "  // position 1: -1 0.1 3.25
+    "00 00 00 00 3f 80 00 00 3f 00 00 00 "  // position 2: 0 1 0.5
+    "ab c5 e1 23 07 ff f0 00 "  // abc 5e, 123 07, fff 00, 0: normals and rings, filled up
+    "ff 80 00 00 00 00 01 02 03 "  // colours
+    "39 60 42 92";  // CRC-32C
+// clang-format on
+
 /// What those bytes say.
 inline protocol::DatagramHeader golden_header() {
     protocol::DatagramHeader header;
@@ -89,6 +126,19 @@ inline protocol::EllipsoidRecord golden_ellipsoid() {
 /// Indices 7 and 7 + 1021.
 inline std::vector<protocol::VertexRecord> golden_vertices() {
     return {{{1.0f, -2.0f, 4.0f}}, {{-1.0f, 0.1f, 3.25f}}};
+}
+
+inline protocol::DatagramHeader golden_tagged_header() {
+    protocol::DatagramHeader header = golden_header();
+    header.hint.format = {.normal_bits = 12, .ring = true, .colour = true};
+    return header;
+}
+
+/// Indices 0, 1, 2.
+inline std::vector<protocol::VertexRecord> golden_tagged_vertices() {
+    return {{{1.0f, -2.0f, 4.0f}, 0xabc, 0x5e, {0xff, 0x80, 0}},
+            {{-1.0f, 0.1f, 3.25f}, 0x123, 0x07, {0, 0, 0}},
+            {{0.0f, 1.0f, 0.5f}, 0xfff, 0, {1, 2, 3}}};
 }
 
 }  // namespace ellicast::tests

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "protocol/datagram.hpp"
+#include "protocol/object_table.hpp"
 #include "tests/protocol/golden_datagram.hpp"
 #include "tests/protocol/wire_samples.hpp"
 
@@ -46,6 +47,35 @@ TEST_CASE("reading the golden bytes gives the golden datagram") {
     for (std::size_t k = 0; k < 2; ++k) CHECK(vertices.vertex(k) == golden_vertices()[k]);
 }
 
+TEST_CASE("the golden datagram of tagged vertices is written and read") {
+    const Bytes bytes = from_hex(kGoldenTaggedHex);
+    const std::vector<VertexRecord> vertices = golden_tagged_vertices();
+    DatagramWriter writer(golden_tagged_header(), kMinDatagramBytes);
+    writer.add_vertices(0, 1, vertices);
+    CHECK(writer.finish() == bytes);
+
+    const auto view = parse_datagram(bytes);
+    REQUIRE(view);
+    CHECK(view->header == golden_tagged_header());
+    REQUIRE(view->sections().size() == 1);
+    REQUIRE(view->sections()[0].count == 3);
+    for (std::size_t k = 0; k < 3; ++k) CHECK(view->sections()[0].vertex(k) == vertices[k]);
+}
+
+TEST_CASE("the table of the object id holds a vertex's position and the tags of the format") {
+    Bytes table;
+    feed_object_table(golden_tagged_header().hint, {}, golden_tagged_vertices(),
+                      [&](std::span<const std::uint8_t> part) {
+                          table.insert(table.end(), part.begin(), part.end());
+                      });
+    const Bytes tail = from_hex(
+        "3f 80 00 00 c0 00 00 00 40 80 00 00 0a bc 5e ff 80 00 "
+        "bf 80 00 00 3d cc cc cd 40 50 00 00 01 23 07 00 00 00 "
+        "00 00 00 00 3f 80 00 00 3f 00 00 00 0f ff 00 01 02 03");
+    REQUIRE(table.size() == kCanonicalHintBytes + tail.size());
+    CHECK(Bytes(table.begin() + kCanonicalHintBytes, table.end()) == tail);
+}
+
 TEST_CASE("the canonical hint is the hint on the wire and then its approximate flag") {
     Bytes wire = from_hex(kGoldenHex);
     const Bytes expected(wire.begin() + 30, wire.begin() + 73);
@@ -64,6 +94,17 @@ TEST_CASE("sizes on the wire are those of the document") {
     CHECK(writer.vertices_that_fit() == 91);
     CHECK(writer.ellipsoids_that_fit() == 30);
     CHECK(kHeaderBytes + kSectionHeaderBytes + 91 * kVertexBytes + kTrailerBytes == 1198);
+    const auto fit = [](std::uint8_t normal_bits, bool ring, bool colour) {
+        DatagramHeader header = golden_header();
+        header.hint.format = {normal_bits, ring, colour};
+        return DatagramWriter(header, kDefaultDatagramBytes).vertices_that_fit();
+    };
+    CHECK(fit(8, false, false) == 84);
+    CHECK(fit(12, false, false) == 81);
+    CHECK(fit(16, false, false) == 78);
+    CHECK(fit(8, true, false) == 78);
+    CHECK(fit(8, false, true) == 68);
+    CHECK(fit(16, true, true) == 60);
 }
 
 TEST_CASE("every cause of refusal has a name of its own") {

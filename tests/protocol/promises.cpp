@@ -31,6 +31,12 @@ std::string broken_by_description(const Description& description) {
     return "";
 }
 
+/// What the format does not have reads as zero, and no tag is wider than it says.
+bool has_tags_of(const VertexRecord& vertex, const RecordFormat& format) {
+    return vertex.normal >> format.normal_bits == 0 && vertex.ring < (format.ring ? 256 : 1) &&
+           (format.colour || vertex.colour == VertexRecord{}.colour) && vertex.unused == 0;
+}
+
 std::string broken_by_records(const SectionView& section, const Hint& hint) {
     const bool ellipsoids = section.kind == SectionKind::ellipsoids;
     const std::uint32_t total = ellipsoids ? hint.ellipsoids : hint.vertices;
@@ -41,6 +47,7 @@ std::string broken_by_records(const SectionView& section, const Hint& hint) {
         const bool good = ellipsoids ? acceptable(section.ellipsoid(k), hint)
                                      : acceptable(section.vertex(k), hint);
         if (!good) return "record";
+        if (!ellipsoids && !has_tags_of(section.vertex(k), hint.format)) return "tags";
     }
     return "";
 }

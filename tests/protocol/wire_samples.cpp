@@ -39,6 +39,7 @@ Hint random_hint(common::Random& random) {
     hint.euler_all = hint.euler_largest + 2 * (static_cast<int>(hint.components) - 1);
     hint.ellipsoids = static_cast<std::uint16_t>(1 + random.below(kMaxEllipsoids));
     hint.vertices = static_cast<std::uint32_t>(1 + random.below(kMaxVertices));
+    hint.format = RecordFormat::of_code(static_cast<std::uint8_t>(random.below(16)));
     hint.approximate = random.chance(0.5);
     return hint;
 }
@@ -110,6 +111,12 @@ DatagramHeader sample_header() {
     return header;
 }
 
+DatagramHeader sample_header(const RecordFormat& format) {
+    DatagramHeader header = sample_header();
+    header.hint.format = format;
+    return header;
+}
+
 Description sample_description() {
     return {"caf\u00e9 horse", {1e6, -2.5, 0.0}, "mm", "seeded 0.3:0.95", "0.1.0"};
 }
@@ -119,6 +126,14 @@ VertexRecord random_vertex(const Hint& hint, common::Random& random) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto x = static_cast<float>(between(hint.box_min[axis], hint.box_max[axis], random));
         record.position[axis] = std::clamp(x, hint.box_min[axis], hint.box_max[axis]);
+    }
+    const auto any = [&](std::size_t bits) { return random.below(std::size_t{1} << bits); };
+    if (hint.format.normal_bits > 0) {
+        record.normal = static_cast<std::uint16_t>(any(hint.format.normal_bits));
+    }
+    if (hint.format.ring) record.ring = static_cast<std::uint16_t>(any(RecordFormat::kRingBits));
+    if (hint.format.colour) {
+        for (std::uint8_t& channel : record.colour) channel = static_cast<std::uint8_t>(any(8));
     }
     return record;
 }

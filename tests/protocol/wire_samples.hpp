@@ -23,7 +23,7 @@ Bytes from_hex(std::string_view hex);
 protocol::DatagramHeader sample_header();
 protocol::Description sample_description();
 
-/// Records that the hint accepts.
+/// Records that the hint accepts, with the tags of its format.
 protocol::VertexRecord random_vertex(const protocol::Hint& hint, common::Random& random);
 protocol::EllipsoidRecord random_ellipsoid(const protocol::Hint& hint, common::Random& random);
 std::vector<protocol::VertexRecord> random_vertices(std::size_t count, const protocol::Hint& hint,
@@ -31,6 +31,9 @@ std::vector<protocol::VertexRecord> random_vertices(std::size_t count, const pro
 std::vector<protocol::EllipsoidRecord> random_ellipsoids(std::size_t count,
                                                          const protocol::Hint& hint,
                                                          common::Random& random);
+
+/// The sample's header with another record format.
+protocol::DatagramHeader sample_header(const protocol::RecordFormat& format);
 
 /// A full datagram of kDefaultDatagramBytes: description, 10 ellipsoids from index 5 by 17, then
 /// vertices from index 11 by 523 as many as fit.

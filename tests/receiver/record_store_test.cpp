@@ -145,6 +145,44 @@ TEST_CASE("of conflicting records the same one stays whatever came first") {
     }
 }
 
+TEST_CASE("tags arrive with their vertices, in every format, and the id holds") {
+    for (std::uint8_t code = 0; code < 16; ++code) {
+        CAPTURE(int{code});
+        MadeObject object = made_sphere(300, 10);
+        add_tags(object, protocol::RecordFormat::of_code(code));
+        RecordStore store;
+        offer_all(store, made_datagrams(object));
+        const auto snapshot = store.snapshot();
+        REQUIRE(snapshot.has_value());
+        CHECK(snapshot->vertices == object.vertices);
+        CHECK(id_matches(*snapshot));
+        if (code == 0) continue;
+        add_tags(object, protocol::RecordFormat::of_code(code), 2);
+        CHECK(object.id != snapshot->id);
+    }
+}
+
+TEST_CASE("of records that differ in a tag alone the one with the smaller bytes stays") {
+    MadeObject object = made_sphere(300, 10);
+    add_tags(object, {.normal_bits = 16, .ring = true, .colour = true});
+    // In the order of the canonical form: normal, ring, red, green, blue; the first one decides.
+    const std::vector<protocol::VertexRecord> ascending{
+        {{0, 0, 1}, 0x00ff, 9, {9, 9, 9}},    {{0, 0, 1}, 0x0100, 0x7f, {9, 9, 9}},
+        {{0, 0, 1}, 0x0100, 0x80, {0, 9, 9}}, {{0, 0, 1}, 0x0100, 0x80, {1, 8, 9}},
+        {{0, 0, 1}, 0x0100, 0x80, {1, 9, 8}}, {{0, 0, 1}, 0x0100, 0x80, {1, 9, 9}}};
+    for (std::size_t a = 0; a < ascending.size(); ++a) {
+        for (std::size_t b = 0; b < ascending.size(); ++b) {
+            CAPTURE(a, b);
+            RecordStore store;
+            offer(store, made_datagram(made_header(object), 7, std::vector{ascending[a]}));
+            offer(store, made_datagram(made_header(object), 7, std::vector{ascending[b]}));
+            REQUIRE(store.snapshot()->vertices.size() == 1);
+            CHECK(store.snapshot()->vertices[0] == ascending[std::min(a, b)]);
+            CHECK(store.shown()->vertices.conflicting() == (a == b ? 0 : 1));
+        }
+    }
+}
+
 TEST_CASE("zero and minus zero are different records") {
     const MadeObject sent = made_sphere(100, 2);
     const auto header = made_header(sent);

@@ -60,9 +60,10 @@ TEST_CASE("the report has the documented keys") {
     const Run run;
     const auto report = make_report(run.content);
     CHECK(keys(report) == Names{"program", "version", "ends_by", "output", "object", "hint",
-                                "datagrams", "ellipsoids", "vertices", "records", "others", "mesh",
-                                "not_inserted", "quality", "seconds"});
+                                "record_format", "datagrams", "ellipsoids", "vertices", "records",
+                                "others", "mesh", "not_inserted", "quality", "seconds"});
     CHECK(keys(report["object"]) == Names{"id", "name", "unit", "complete", "id_verified"});
+    CHECK(keys(report["record_format"]) == Names{"normal_bits", "ring", "colour"});
     CHECK(keys(report["datagrams"]) == Names{"received", "lost", "duplicate", "reordered",
                                              "malformed", "kernel_dropped", "bytes",
                                              "lost_in_network", "jitter_ms", "malformed_by"});
@@ -77,8 +78,12 @@ TEST_CASE("the report has the documented keys") {
 }
 
 TEST_CASE("the report says what happened") {
-    const Run run;
+    Run run;
+    run.object.hint.format = {.normal_bits = 12, .ring = true};
     const auto report = make_report(run.content);
+    CHECK(report["record_format"]["normal_bits"] == 12);
+    CHECK(report["record_format"]["ring"] == true);
+    CHECK(report["record_format"]["colour"] == false);
     CHECK(report["ends_by"] == "idle");
     CHECK(report["object"]["complete"] == false);
     CHECK(report["object"]["name"] == "0000000000000000");
@@ -99,6 +104,7 @@ TEST_CASE("a report of nothing keeps its keys, but says null") {
     const auto report = make_report({});
     CHECK(report["object"].is_null());
     CHECK(report["hint"].is_null());
+    CHECK(report["record_format"].is_null());
     CHECK(report["mesh"].is_null());
     CHECK(report["output"].is_null());
     CHECK(report["vertices"]["received"] == 0);

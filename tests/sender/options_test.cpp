@@ -50,6 +50,9 @@ TEST_CASE("defaults are those of the manual") {
     CHECK(options.decomposition.candidates == 10'000);
     CHECK(options.decomposition.criterion == Criterion::robust);
     CHECK(options.decomposition.seed == 1);
+    CHECK(options.tags.normal_bits == 8);
+    CHECK_FALSE(options.tags.ring);
+    CHECK(options.tags.colour);
     CHECK(options.copies == 3);
     CHECK(options.bits_per_second == 20'000'000);
     CHECK(options.rounds == 1);
@@ -136,6 +139,21 @@ TEST_CASE("a rate of 0 means unpaced, and 0 rounds mean forever") {
     CHECK(options.rounds == 0);
 }
 
+TEST_CASE("tags are a number of bits, with or without a ring") {
+    const auto tags = [](const char* text) {
+        return accepted({"a.ply", "--to", "h", "--tags", text}).tags;
+    };
+    for (const int bits : {0, 8, 12, 16}) {
+        const std::string text = std::to_string(bits);
+        CHECK(tags(text.c_str()).normal_bits == bits);
+        CHECK_FALSE(tags(text.c_str()).ring);
+        CHECK(tags((text + "+ring").c_str()).normal_bits == bits);
+        CHECK(tags((text + "+ring").c_str()).ring);
+    }
+    CHECK(accepted({"a.ply", "--to", "h", "--colour", "on"}).tags.colour);
+    CHECK_FALSE(accepted({"a.ply", "--to", "h", "--colour", "off"}).tags.colour);
+}
+
 TEST_CASE("decomposing needs no destination") {
     CHECK(accepted({"a.ply", "--decompose-only", "f"}).decompose_only == "f");
 }
@@ -162,6 +180,13 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "575"},
         std::vector<const char*>{"a.ply", "--to", "h", "--datagram", "65508"},
         std::vector<const char*>{"a.ply", "--to", "h", "--seed", "-1"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--tags", "10"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--tags", "ring"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--tags", "+ring"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--tags", "8+rings"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--tags", "8 +ring"},
+        std::vector<const char*>{"a.ply", "--to", "h", "--tags", ""},
+        std::vector<const char*>{"a.ply", "--to", "h", "--colour", "red"},
         std::vector<const char*>{"a.ply", "--to", "h", "--drop", "1.5"},
         std::vector<const char*>{"a.ply", "--to", "h", "--drop", "nan"},
         std::vector<const char*>{"a.ply", "--to", "h", "--loss", "rain:0.1"},
@@ -195,12 +220,19 @@ TEST_CASE("help shows every flag with examples, version the version; both end wi
     const Parsed help = parse({"--help"});
     REQUIRE(std::holds_alternative<int>(help.result));
     CHECK(std::get<int>(help.result) == 0);
-    for (const char* text : {"MODEL",           "--to",        "--ellipsoids", "--candidates",
-                             "--copies",        "--criterion", "--rate",       "--rounds",
-                             "--datagram",      "--seed",      "--cache",      "--decompose-only",
-                             "--report",        "--log-level", "--quiet",      "--config",
-                             "--version",       "--threads",   "--drop",       "--drop-ellipsoids",
-                             "--drop-vertices", "--loss",      "Examples:",    "Exit codes"}) {
+    for (const char* text : {"MODEL",           "--to",
+                             "--ellipsoids",    "--candidates",
+                             "--copies",        "--criterion",
+                             "--rate",          "--rounds",
+                             "--datagram",      "--seed",
+                             "--cache",         "--decompose-only",
+                             "--tags",          "--colour",
+                             "--report",        "--log-level",
+                             "--quiet",         "--config",
+                             "--version",       "--threads",
+                             "--drop",          "--drop-ellipsoids",
+                             "--drop-vertices", "--loss",
+                             "Examples:",       "Exit codes"}) {
         CHECK_THAT(help.out, Catch::Contains(text));
     }
     CHECK(help.err.empty());

@@ -98,6 +98,20 @@ MadeObject made_sphere(std::uint32_t vertices, std::uint16_t ellipsoids, std::ui
     return object;
 }
 
+void add_tags(MadeObject& object, const protocol::RecordFormat& format, std::uint64_t seed) {
+    common::Random random(seed);
+    object.hint.format = format;
+    for (VertexRecord& vertex : object.vertices) {
+        const auto bits = static_cast<std::uint32_t>(random.next());
+        vertex.normal = static_cast<std::uint16_t>(bits & ((1u << format.normal_bits) - 1));
+        vertex.ring = static_cast<std::uint16_t>(format.ring ? bits >> 16 & 0xff : 0);
+        for (std::uint8_t& channel : vertex.colour) {
+            channel = static_cast<std::uint8_t>(format.colour ? random.next() : 0);
+        }
+    }
+    identify(object);
+}
+
 void identify(MadeObject& object) {
     object.id =
         protocol::object_id_of<common::Digest>(object.hint, object.ellipsoids, object.vertices);
@@ -123,7 +137,7 @@ std::vector<Datagram> made_datagrams(const MadeObject& object, const MadeStream&
         stream.datagram_bytes - protocol::kHeaderBytes - protocol::kTrailerBytes - 128;
     std::vector<Part> plan;
     add_strided(plan, true, object.hint.ellipsoids, room / protocol::kEllipsoidBytes);
-    add_strided(plan, false, object.hint.vertices, room / protocol::kVertexBytes);
+    add_strided(plan, false, object.hint.vertices, object.hint.format.vertices_within(room));
 
     protocol::DatagramHeader header = made_header(object, stream);
     header.datagrams = static_cast<std::uint32_t>(plan.size());

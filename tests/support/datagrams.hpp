@@ -24,6 +24,9 @@ struct MadeObject {
 /// ellipsoids that fill it, each slightly different. The id is true.
 MadeObject made_sphere(std::uint32_t vertices, std::uint16_t ellipsoids, std::uint64_t seed = 1);
 
+/// Gives every vertex seeded tags of this format, and makes the id true.
+void add_tags(MadeObject& object, const protocol::RecordFormat& format, std::uint64_t seed = 1);
+
 /// Makes the id true again after a change of hint or records.
 void identify(MadeObject& object);
 

@@ -24,8 +24,9 @@ constexpr std::uint16_t kFirstSequence = 65'000;  // so that long streams wrap a
 }  // namespace
 
 SimulatedModel load_simulated(const std::filesystem::path& path,
-                              const sender::DecompositionOptions& options) {
-    return {common::read_model(path), sender::load_model(path, options, std::nullopt)};
+                              const sender::DecompositionOptions& options,
+                              const sender::TagOptions& tags) {
+    return {common::read_model(path), sender::load_model(path, options, std::nullopt, tags)};
 }
 
 std::vector<TimedDatagram> broadcast(const sender::BroadcastObject& object,

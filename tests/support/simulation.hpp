@@ -25,9 +25,10 @@ struct SimulatedModel {
     sender::LoadedModel loaded;
 };
 
-/// Reads, prepares, decomposes; throws common::ModelError.
+/// Reads, prepares, decomposes; throws common::ModelError. Tags are those of the program's default.
 SimulatedModel load_simulated(const std::filesystem::path& path,
-                              const sender::DecompositionOptions& options = {});
+                              const sender::DecompositionOptions& options = {},
+                              const sender::TagOptions& tags = {});
 
 struct TimedDatagram {
     std::chrono::nanoseconds at{};

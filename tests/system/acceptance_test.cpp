@@ -27,13 +27,14 @@ namespace {
 constexpr unsigned kSeeds = 5;
 
 /// The model by the name of its file; empty, with a line that says so, without the models.
-std::optional<tests::SimulatedModel> reference_model(const std::string& name) {
+std::optional<tests::SimulatedModel> reference_model(const std::string& name,
+                                                     const sender::TagOptions& tags = {}) {
     const auto directory = tests::models_dir();
     if (!directory) {
         WARN("SKIPPED: no reference models here (set ELLICAST_MODELS); " << name << " not tried");
         return std::nullopt;
     }
-    return tests::load_simulated(*directory / (name + ".ply"));
+    return tests::load_simulated(*directory / (name + ".ply"), {}, tags);
 }
 
 struct Run {
@@ -131,7 +132,7 @@ void check_vertices(const Run& run) {
 }
 
 void check_without_loss(const std::string& name, std::int64_t genus, double rms) {
-    const auto model = reference_model(name);
+    const auto model = reference_model(name, {.normal_bits = 0});
     if (!model) return;
     const Run whole = run(*model, {});
     WARN(figures(name + ", no loss", whole));

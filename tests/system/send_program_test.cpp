@@ -114,6 +114,35 @@ Heard heard(const std::vector<std::vector<std::uint8_t>>& datagrams) {
 
 }  // namespace
 
+TEST_CASE("tags and colours are on the wire as asked for, and the report says which") {
+    const Workplace place;
+    common::TriangleMesh mesh = common::read_model(place.model());
+    const bool coloured = GENERATE(true, false);
+    if (coloured) mesh.colours.assign(mesh.positions.size(), common::Colour{1, 2, 3});
+    common::write_ply(place.model(), mesh);
+    struct Case {
+        Arguments arguments;
+        protocol::RecordFormat format;
+    };
+    for (const auto& [arguments, format] :
+         {Case{{}, {8, false, coloured}}, Case{{"--colour", "off"}, {8, false, false}},
+          Case{{"--tags", "12+ring", "--colour", "on"}, {12, true, coloured}},
+          Case{{"--tags", "0", "--colour", "off"}, {0, false, false}}}) {
+        UdpSink sink;
+        const Outcome outcome = place.send(sink, arguments);
+        INFO(outcome.err);
+        REQUIRE(outcome.code == 0);
+        const auto datagrams = sink.datagrams();
+        const auto view = protocol::parse_datagram(datagrams.front());
+        REQUIRE(view.has_value());
+        CHECK(view->header.hint.format == format);
+        const json said = place.report()["models"][0]["record_format"];
+        CHECK(said["normal_bits"] == format.normal_bits);
+        CHECK(said["ring"] == format.ring);
+        CHECK(said["colour"] == format.colour);
+    }
+}
+
 TEST_CASE("what is heard is the model, and the report counts it") {
     const Workplace place;
     UdpSink sink;

@@ -1,13 +1,16 @@
 // tests/system/simulation_test.cpp: both cores joined in one process, on made models.
 #include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "common/mesh_topology.hpp"
 #include "common/model_io.hpp"
+#include "receiver/output_files.hpp"
 #include "receiver/reconstruction.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/meshes.hpp"
@@ -155,6 +158,44 @@ TEST_CASE("whatever the losses, what was received is a closed manifold with it a
         CHECK(missing == 0);
         CHECK(result.not_inserted.size() * 100 <= reception.object->vertices.size());
     }
+}
+
+TEST_CASE("colours and tags cross with their vertices and land in the file") {
+    common::TriangleMesh mesh = tests::torus(1.0, 0.4, 60, 30);
+    std::map<std::array<float, 3>, common::Colour> expected;
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+        mesh.colours.push_back({static_cast<std::uint8_t>(v), static_cast<std::uint8_t>(v / 8),
+                                static_cast<std::uint8_t>(255 - v % 100)});
+        const Eigen::Vector3f p = mesh.positions[v].cast<float>();
+        expected[{p.x(), p.y(), p.z()}] = mesh.colours[v];
+    }
+    const tests::TemporaryDirectory directory;
+    const auto path = directory.path() / "made.ply";
+    common::write_ply(path, mesh);
+    const sender::TagOptions tags{.normal_bits = 12, .ring = true};
+    const auto model = tests::load_simulated(path, quick(), tags);
+    CHECK(model.loaded.object.hint.format.colour);
+
+    tests::BroadcastOptions how;
+    how.impairment.drop = GENERATE(0.0, 0.5);
+    const auto reception = tests::receive(tests::broadcast(model.loaded.object, how));
+    REQUIRE(reception.object.has_value());
+    for (std::size_t k = 0; k < reception.object->vertices.size(); ++k) {
+        REQUIRE(reception.object->vertices[k] ==
+                model.loaded.object.vertices[reception.object->vertex_index[k]]);
+    }
+    const receiver::Reconstruction result = rebuilt(*reception.object);
+    receiver::write_mesh(directory.path() / "out.ply", result, *reception.object);
+    const common::TriangleMesh out = common::read_model(directory.path() / "out.ply");
+    REQUIRE(out.colours.size() == out.positions.size());
+    std::size_t own = 0;
+    for (std::size_t v = 0; v < out.positions.size(); ++v) {
+        if (result.vertex_index[v] == receiver::kNotReceived) continue;
+        const Eigen::Vector3f p = out.positions[v].cast<float>();
+        REQUIRE(out.colours[v] == expected.at({p.x(), p.y(), p.z()}));
+        ++own;
+    }
+    CHECK(own + result.not_inserted.size() == reception.object->vertices.size());
 }
 
 TEST_CASE("losses in bursts have the share and the length asked for") {
