@@ -11,6 +11,8 @@
 
 #include "common/mesh_distance.hpp"
 #include "common/mesh_topology.hpp"
+#include "common/model_io.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/floor.hpp"
 #ifdef ELLICAST_WITH_CGAL
 #include "tests/support/rivals.hpp"
@@ -29,6 +31,13 @@ using common::TriangleMesh;
 // 3.5 bytes, as if it were packed like the best single-rate coder.
 constexpr double kProgressiveBytes = 12 + 4.5 / 8;
 constexpr double kPackedProgressiveBytes = 3.5;
+
+// What the loss acts on.
+constexpr sender::TagOptions kPlain{.normal_bits = 0, .ring = false, .colour = false};
+
+bool same_tags(const sender::TagOptions& a, const sender::TagOptions& b) {
+    return a.normal_bits == b.normal_bits && a.ring == b.ring && a.colour == b.colour;
+}
 
 struct Work {
     const ComparedModel& model;
@@ -190,8 +199,11 @@ std::vector<std::uint32_t> records_of_original(const SimulatedModel& model) {
 }  // namespace
 
 const std::vector<Variant>& variants() {
+    const auto as_it_comes = [](receiver::ReconstructionOptions&) {};
     static const std::vector<Variant> all{
-        {"ellicast", {}, [](receiver::ReconstructionOptions&) {}},
+        {"ellicast", kPlain, as_it_comes},
+        {"ellicast-tags", {.normal_bits = 8, .ring = false, .colour = false}, as_it_comes},
+        {"ellicast-ring", {.normal_bits = 8, .ring = true, .colour = false}, as_it_comes},
     };
     return all;
 }
@@ -205,10 +217,11 @@ std::vector<std::string> all_methods() {
 #endif
 #ifdef ELLICAST_WITH_DRACO
     methods.emplace_back("draco-mds");
-    std::vector<protocol::RecordFormat> formats{{}};
+    std::vector<sender::TagOptions> seen{kPlain};
     for (const Variant& variant : variants()) {
-        if (std::find(formats.begin(), formats.end(), variant.format) != formats.end()) continue;
-        formats.push_back(variant.format);
+        const auto same = [&](const auto& tags) { return same_tags(tags, variant.tags); };
+        if (std::any_of(seen.begin(), seen.end(), same)) continue;
+        seen.push_back(variant.tags);
         methods.push_back("draco-mds-as-" + std::string(variant.name));
     }
 #endif
@@ -220,14 +233,19 @@ std::vector<std::string> all_methods() {
 ComparedModel load_compared(const std::filesystem::path& path, const ComparisonOptions& options) {
     ComparedModel model;
     model.name = path.stem().string();
-    model.plain = load_simulated(path, options.decomposition);
+    const TemporaryDirectory cache;  // one decomposition for all of them
+    const auto load = [&](const sender::TagOptions& tags) {
+        return sender::load_model(path, options.decomposition, cache.path(), tags);
+    };
+    model.plain = {common::read_model(path), load(kPlain)};
     model.stream = broadcast(model.plain.loaded.object);
     model.stream_bytes = bytes_of(model.stream);
     model.record_of = records_of_original(model.plain);
     for (const Variant& variant : variants()) {
         VariantObject& made = model.variants.emplace_back();
         made.variant = variant;
-        made.object = model.plain.loaded.object;
+        made.object =
+            same_tags(variant.tags, kPlain) ? model.plain.loaded.object : load(variant.tags).object;
         check_same_records(made.object, model.plain.loaded.object);
         made.stream_bytes = bytes_of(broadcast(made.object));
     }

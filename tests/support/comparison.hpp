@@ -18,13 +18,13 @@ namespace ellicast::tests {
 /// stream would have cost stands beside.
 struct Variant {
     std::string_view name;
-    protocol::RecordFormat format;
+    sender::TagOptions tags;
     void (*configure)(receiver::ReconstructionOptions&);
 };
 const std::vector<Variant>& variants();
 
 /// Every method that there is: the variants, then "floor", "advancing-front" (with CGAL),
-/// "draco-mds" and one for each further record format (with Draco), "progressive" and
+/// "draco-mds" and one for the bytes of each kind of tags (with Draco), "progressive" and
 /// "progressive-packed".
 std::vector<std::string> all_methods();
 

@@ -74,6 +74,20 @@ TEST_CASE("all methods stand on what the same datagrams left") {
     CHECK(rows.at("progressive").bytes == reception.bytes_in_order);
 }
 
+TEST_CASE("tags cost bytes, and the variants have nothing else in another place") {
+    const auto rows = run({0.3, 1, 1});
+    const ComparisonRow& plain = rows.at("ellicast");
+    const ComparisonRow& tags = rows.at("ellicast-tags");
+    CHECK(tags.vertices == plain.vertices);
+    CHECK(tags.ellipsoids == plain.ellipsoids);
+    CHECK(tags.stream_bytes > plain.stream_bytes + 3'200);
+    CHECK(tags.stream_bytes < plain.stream_bytes + 2 * 3'200);
+    CHECK(tags.bytes > plain.bytes);
+    CHECK(ring().variants[1].object.vertices[5].position ==
+          ring().variants[0].object.vertices[5].position);
+    CHECK(ring().variants[1].object.hint.format.normal_bits == 8);
+}
+
 TEST_CASE("a prefix is the beginning of the stream") {
     const CellReception whole = receive_cell(ring(), {0, 1, 1}, 0);
     const CellReception half = receive_cell(ring(), {0, 0.5, 1}, 0);

@@ -236,7 +236,8 @@ void check_coarse(const CompareOptions& options) {
         for (const std::size_t count : {100u, 200u, 400u}) {
             ComparisonOptions how = options.comparison;
             how.decomposition.ellipsoids = count;
-            const SimulatedModel model = load_simulated(file, how.decomposition);
+            const SimulatedModel model =
+                load_simulated(file, how.decomposition, {.normal_bits = 0, .colour = false});
             receiver::ReceivedObject object;
             object.hint = model.loaded.object.hint;
             object.description = model.loaded.object.description;
