@@ -47,6 +47,7 @@ PlanOptions plan_options_of(const Options& options) {
     PlanOptions plan;
     plan.datagram_bytes = options.datagram_bytes;
     plan.copies = options.copies;
+    plan.redundancy = options.redundancy;
     plan.bits_per_second = options.bits_per_second;
     plan.rounds = options.rounds;
     return plan;
@@ -69,7 +70,7 @@ LoadedModel load_certified_model(const std::filesystem::path& path, const Option
     const auto load = [&](std::size_t ellipsoids) {
         DecompositionOptions decomposition = options.decomposition;
         decomposition.ellipsoids = ellipsoids;
-        return load_model(path, decomposition, options.cache);
+        return load_model(path, decomposition, options.cache, options.tags, options.order);
     };
     LoadedModel model = load_certified(load, certification);
     if (progress) std::fputs("\r\033[K", stderr);
