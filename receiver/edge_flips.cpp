@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
 
@@ -100,6 +101,12 @@ FlipCost flip_cost(const Quad& q, const std::array<Vector3d, 4>& outer) {
     return {now, flipped};
 }
 
+// By how much the angles opposite this edge exceed those opposite the other diagonal, in radians.
+double delaunay_excess(const Quad& q) {
+    return angle_between(q.a - q.c, q.b - q.c) + angle_between(q.a - q.d, q.b - q.d) -
+           angle_between(q.c - q.a, q.d - q.a) - angle_between(q.c - q.b, q.d - q.b);
+}
+
 double mean_edge_length(const SurfaceMesh& mesh) {
     double sum = 0.0;
     std::size_t count = 0;
@@ -115,7 +122,28 @@ double mean_edge_length(const SurfaceMesh& mesh) {
 }
 
 // What flipping h gains; minus infinity when the flip leaves a needle.
-double smoothing_gain(const SurfaceMesh& mesh, HalfedgeId h) {
+// How far the surface rises above the middle of an edge, after the normals at its ends.
+double rise(const Vector3d& p, const Vector3d& q, const Vector3d& n, const Vector3d& m) {
+    return (q - p).dot(m - n) / 8.0;
+}
+
+// How much nearer the other diagonal of the quad comes to the surface that the normals ask for, as
+// far as both diagonals' ends agree on it: at creases they don't, and the normals say nothing.
+double height_gain(const Quad& q, std::span<const Vector3d> normals) {
+    const Vector3d up = (normal_of(q.a, q.b, q.c) + normal_of(q.b, q.a, q.d)).normalized();
+    const double z = 0.5 * (q.c + q.d - q.a - q.b).dot(up);
+    const double over_ab = rise(q.a, q.b, normals[q.id[0]], normals[q.id[1]]);
+    const double over_cd = z + rise(q.c, q.d, normals[q.id[2]], normals[q.id[3]]);
+    const auto nearer = [z](double surface) { return std::abs(surface) - std::abs(surface - z); };
+    const double after_ab = nearer(over_ab);
+    const double after_cd = nearer(over_cd);
+    if (after_ab > 0.0 && after_cd > 0.0) return std::min(after_ab, after_cd);
+    if (after_ab < 0.0 && after_cd < 0.0) return std::max(after_ab, after_cd);
+    return 0.0;
+}
+
+double smoothing_gain(const SurfaceMesh& mesh, HalfedgeId h, double unit,
+                      const FlipCriterion& criterion) {
     const HalfedgeId t = mesh.twin(h);
     const Quad q = quad_of(mesh, h);
     const double thin_now =
@@ -129,7 +157,13 @@ double smoothing_gain(const SurfaceMesh& mesh, HalfedgeId h) {
     const FlipCost cost =
         flip_cost(q, {outer_normal(SurfaceMesh::next(h)), outer_normal(SurfaceMesh::prev(h)),
                       outer_normal(SurfaceMesh::next(t)), outer_normal(SurfaceMesh::prev(t))});
-    return cost.now - cost.flipped;
+    double gain = cost.now - cost.flipped;
+    if (criterion.delaunay_weight > 0.0) {
+        gain += criterion.delaunay_weight * unit * delaunay_excess(q);
+    }
+    if (criterion.height_weight > 0.0)
+        gain += criterion.height_weight * height_gain(q, criterion.normals);
+    return gain;
 }
 
 std::array<HalfedgeId, 4> sides_of(const SurfaceMesh& mesh, HalfedgeId h) {
@@ -140,8 +174,11 @@ std::array<HalfedgeId, 4> sides_of(const SurfaceMesh& mesh, HalfedgeId h) {
 // Sweeps over the edges in slot order, again over those that a flip made doubtful.
 class Smoother {
   public:
-    explicit Smoother(SurfaceMesh& mesh)
-        : mesh_(mesh), unit_(mean_edge_length(mesh)), doubtful_(3 * mesh.face_slots()) {}
+    Smoother(SurfaceMesh& mesh, const FlipCriterion& criterion)
+        : mesh_(mesh),
+          criterion_(criterion),
+          unit_(mean_edge_length(mesh)),
+          doubtful_(3 * mesh.face_slots()) {}
 
     template <class Attempt>
     std::size_t sweep(int passes, const Attempt& attempt) {
@@ -162,7 +199,8 @@ class Smoother {
     }
 
     std::size_t flip_one(HalfedgeId h) {
-        if (!(smoothing_gain(mesh_, h) > kMinGain * unit_) || !mesh_.can_flip(h)) return 0;
+        if (!(smoothing_gain(mesh_, h, unit_, criterion_) > kMinGain * unit_) || !mesh_.can_flip(h))
+            return 0;
         mesh_.flip(h);
         mark(h);
         return 1;
@@ -172,7 +210,7 @@ class Smoother {
     // together do not pay. Leads out of the local minima of flip_one: a crease two triangles wide,
     // say.
     std::size_t flip_two(HalfedgeId h) {
-        const double first = smoothing_gain(mesh_, h);
+        const double first = smoothing_gain(mesh_, h, unit_, criterion_);
         if (!(first > -kLookAhead * unit_) || !mesh_.can_flip(h)) return 0;
         mesh_.flip(h);
         HalfedgeId second = kNone;
@@ -180,7 +218,7 @@ class Smoother {
         const bool alone = gain < 0.0;
         gain = std::max(gain, 0.0);
         for (const HalfedgeId side : sides_of(mesh_, h)) {
-            const double here = smoothing_gain(mesh_, side);
+            const double here = smoothing_gain(mesh_, side, unit_, criterion_);
             if (here > gain && mesh_.can_flip(side)) {
                 second = side;
                 gain = here;
@@ -210,6 +248,7 @@ class Smoother {
     }
 
     SurfaceMesh& mesh_;
+    const FlipCriterion& criterion_;
     double unit_;
     std::vector<char> doubtful_;
 };
@@ -250,8 +289,8 @@ std::size_t flip_all_to_delaunay(SurfaceMesh& mesh) {
     return flip_to_delaunay(mesh, queue);
 }
 
-std::size_t flip_to_smooth(SurfaceMesh& mesh, int passes) {
-    Smoother smoother(mesh);
+std::size_t flip_to_smooth(SurfaceMesh& mesh, const FlipCriterion& criterion, int passes) {
+    Smoother smoother(mesh, criterion);
     const std::size_t flips =
         smoother.sweep(passes, [&](HalfedgeId h) { return smoother.flip_one(h); });
     return flips + smoother.sweep(passes, [&](HalfedgeId h) { return smoother.flip_two(h); });

@@ -17,6 +17,7 @@ namespace ellicast::receiver {
 struct ReconstructionOptions {
     int grid = 96;         // cells of the distance grid along the longest axis of the hinted box
     unsigned threads = 0;  // does not change the result
+    bool conceal = true;   // guess the missing vertices
     bool keep_stages = false;
     /// Called with the name of the stage that begins; for progress and timing. May be empty.
     std::function<void(const char* stage)> on_stage = {};

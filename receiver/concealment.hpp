@@ -1,0 +1,38 @@
+// receiver/concealment.hpp
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/triangle_mesh.hpp"
+#include "common/triangle_tree.hpp"
+
+namespace ellicast::receiver {
+
+/// What the ellipsoids say of the surface between received vertices.
+struct ShapeGuide {
+    const common::TriangleTree* surface = nullptr;  // coarse surface, wrapped to the vertices
+    double cell = 0;                                // its resolution
+};
+
+/// A vertex of a surface with gaps.
+struct KnownVertex {
+    Eigen::Vector3d normal;  // unit
+    double doubt = 0;        // distance from here to the coarse surface before it was wrapped
+};
+
+/// Unit normal at each position, from the triangles around it, weighted so that it is exact on
+/// spheres ([Max99]); zero where there is none.
+std::vector<Eigen::Vector3d> vertex_normals(const common::TriangleMesh& mesh);
+
+/// Guesses the vertices that are missing: splits edges at midpoints that bulge as the normals at
+/// their ends ask for (DESIGN section 7, "Concealment": the harmonic mean of what the two ends ask
+/// for, so that a crease stays a crease), as the other diagonal asks for, and as the coarse surface
+/// does where it was right at the ends. Edges longer than two cells are split again. Positions of
+/// the mesh stay bit for bit and keep their places; guessed ones follow. Edges that would not bulge
+/// are not split; triangles are cut to fit: a closed manifold stays one, of the same topology.
+/// `strength` scales the bulge, 0 to 1. Cost: linear, and a search of the guide per edge.
+common::TriangleMesh conceal(const common::TriangleMesh& mesh, std::vector<KnownVertex> vertices,
+                             const ShapeGuide& guide, double strength, unsigned threads);
+
+}  // namespace ellicast::receiver
