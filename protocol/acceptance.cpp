@@ -67,7 +67,7 @@ bool acceptable(const Hint& hint) {
     if (!box_is_plausible(hint) || !topology_is_possible(hint)) return false;
     if (hint.vertices > kMaxVertices) return false;
     if (hint.ellipsoids == 0 && hint.vertices == 0) return false;
-    return hint.format.is_known();
+    return hint.format.is_known() && hint.diagonals < kDiagonalRules;
 }
 
 RecordBounds::RecordBounds(const Hint& hint) {

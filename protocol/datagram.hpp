@@ -67,7 +67,7 @@ struct RecordFormat {
     bool colour = false;
     bool operator==(const RecordFormat&) const = default;
 
-    /// The byte on the wire: bits 0-1 the size of the normal, bit 2 ring, bit 3 colour. Requires
+    /// The nibble on the wire: bits 0-1 the size of the normal, bit 2 ring, bit 3 colour. Requires
     /// is_known() (asserted).
     [[nodiscard]] std::uint8_t code() const;
     /// Of an unknown code: one that no acceptable hint has.
@@ -91,6 +91,9 @@ struct RecordFormat {
     static constexpr std::size_t kColourBytes = 3;
 };
 
+/// WIRE_FORMAT.md section 4.3 says what they are.
+inline constexpr std::uint8_t kDiagonalRules = 6;
+
 /// What every datagram says of the whole object; enough to rebuild it and to check the result.
 /// Topology is that of the boundary of the union of the solid.
 struct Hint {
@@ -102,6 +105,7 @@ struct Hint {
     std::uint16_t ellipsoids = 0;    // distinct records in the object
     std::uint32_t vertices = 0;      // distinct records in the object
     RecordFormat format;
+    std::uint8_t diagonals = 0;  // below kDiagonalRules: how the mesh was triangulated
     bool approximate = false;  // the promise is not to be judged (overlapping parts, inner shells)
     bool operator==(const Hint&) const = default;
 };

@@ -49,7 +49,9 @@ Hint read_hint(ByteReader& reader) {
     hint.euler_largest = reader.i32();
     hint.ellipsoids = reader.u16();
     hint.vertices = reader.u32();
-    hint.format = RecordFormat::of_code(reader.u8());
+    const std::uint8_t format = reader.u8();
+    hint.format = RecordFormat::of_code(format & 15);
+    hint.diagonals = format >> 4;
     return hint;
 }
 

@@ -30,7 +30,7 @@ void write_hint(ByteWriter& writer, const Hint& hint) {
     writer.i32(hint.euler_largest);
     writer.u16(hint.ellipsoids);
     writer.u32(hint.vertices);
-    writer.u8(hint.format.code());
+    writer.u8(static_cast<std::uint8_t>(hint.format.code() | hint.diagonals << 4));
 }
 
 void write_header(ByteWriter& writer, const DatagramHeader& header) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/parallel.hpp"
+#include "common/vertex_normals.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -199,20 +200,6 @@ void split(const std::vector<Edge>& edges, const std::vector<Vector3d>& bulges, 
 
 }  // namespace
 
-std::vector<Vector3d> vertex_normals(const TriangleMesh& mesh) {
-    std::vector<Vector3d> normals(mesh.positions.size(), Vector3d::Zero());
-    for (const Triangle& t : mesh.triangles) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Vector3d u = mesh.positions[t[(k + 1) % 3]] - mesh.positions[t[k]];
-            const Vector3d v = mesh.positions[t[(k + 2) % 3]] - mesh.positions[t[k]];
-            const double weight = u.squaredNorm() * v.squaredNorm();
-            if (weight > 0.0) normals[t[k]] += u.cross(v) / weight;
-        }
-    }
-    for (Vector3d& n : normals) n.normalize();
-    return normals;
-}
-
 TriangleMesh conceal(const TriangleMesh& mesh, std::vector<KnownVertex> vertices,
                      const ShapeGuide& guide, double strength, unsigned threads) {
     assert(vertices.size() == mesh.positions.size());
@@ -228,7 +215,7 @@ TriangleMesh conceal(const TriangleMesh& mesh, std::vector<KnownVertex> vertices
         const std::size_t before = result.positions.size();
         split(edges, bulges, result, vertices);
         if (result.positions.size() == before) break;
-        const std::vector<Vector3d> normals = vertex_normals(result);
+        const std::vector<Vector3d> normals = common::vertex_normals(result);
         for (std::size_t v = before; v < vertices.size(); ++v) vertices[v].normal = normals[v];
     }
     return result;

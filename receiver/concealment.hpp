@@ -21,10 +21,6 @@ struct KnownVertex {
     double doubt = 0;        // distance from here to the coarse surface before it was wrapped
 };
 
-/// Unit normal at each position, from the triangles around it, weighted so that it is exact on
-/// spheres ([Max99]); zero where there is none.
-std::vector<Eigen::Vector3d> vertex_normals(const common::TriangleMesh& mesh);
-
 /// Guesses the vertices that are missing: splits edges at midpoints that bulge as the normals at
 /// their ends ask for (DESIGN section 7, "Concealment": the harmonic mean of what the two ends ask
 /// for, so that a crease stays a crease), as the other diagonal asks for, and as the coarse surface

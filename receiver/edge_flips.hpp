@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "common/diagonal_choice.hpp"
 #include "receiver/surface_mesh.hpp"
 
 namespace ellicast::receiver {
@@ -19,15 +20,10 @@ std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue);
 /// As above with all edges in the queue.
 std::size_t flip_all_to_delaunay(SurfaceMesh& mesh);
 
-/// What else a flip is judged by. The weights set it against length x angle.
+/// What a flip is judged by beside creases; see common/diagonal_choice.hpp.
 struct FlipCriterion {
-    /// Unit, per vertex slot; used with height_weight only.
-    std::span<const Eigen::Vector3d> normals = {};
-    /// Of how much nearer the new edge comes to the surface that the normals at the corners ask
-    /// for (DESIGN section 7, "harmonic PN"), where those of both diagonals agree.
-    double height_weight = 0;
-    /// Of the angles opposite an edge, times the mean edge length: for meshes that were Delaunay.
-    double delaunay_weight = 0;
+    std::span<const Eigen::Vector3d> normals = {};  // unit, per vertex slot; or none at all
+    common::DiagonalWeights weights = {};
 };
 
 /// Flips that lower the sum over all edges of length x (dihedral angle + 0.1 rad): few and gentle

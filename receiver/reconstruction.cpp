@@ -11,6 +11,7 @@
 #include "common/octahedral_normal.hpp"
 #include "common/parallel.hpp"
 #include "common/triangle_tree.hpp"
+#include "common/vertex_normals.hpp"
 #include "receiver/concealment.hpp"
 #include "receiver/edge_flips.hpp"
 #include "receiver/ellipsoid_mesh.hpp"
@@ -96,9 +97,6 @@ class Pipeline {
     static constexpr double kConcealedReach = 4.0;
     static constexpr double kReachSlope = 8.0;
     static constexpr double kSparse = 6.0;
-    // Weights of what normals say against length x angle, for flips: estimated normals, tags.
-    static constexpr double kHeightWeight = 9.0;
-    static constexpr double kTaggedHeightWeight = 18.0;
     // Concealment in full from a third of the vertices lost.
     static constexpr double kStrengthPerLoss = 3.0;
 
@@ -166,13 +164,18 @@ class Pipeline {
         shift_to_points(surface_, points_);
         stage("flip");
         flip_all_to_delaunay(surface_.mesh);
-        flip_to_smooth(surface_.mesh);
+        const common::DiagonalWeights weights =
+            common::diagonal_weights(object_.hint.diagonals, has_normals(), loss());
+        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle}});
         const std::vector<Vector3d> normals = guiding_normals();
-        flip_to_smooth(surface_.mesh,
-                       {.normals = normals,
-                        .height_weight = has_normals() ? kTaggedHeightWeight : kHeightWeight});
+        flip_to_smooth(surface_.mesh, {.normals = normals, .weights = weights});
     }
 
+    // Of vertices; the one loss that geometry knows of (DESIGN section 1).
+    [[nodiscard]] double loss() const {
+        return 1.0 -
+               static_cast<double>(points_.size()) / static_cast<double>(object_.hint.vertices);
+    }
     [[nodiscard]] bool has_normals() const { return object_.hint.format.normal_bits != 0; }
 
     // Of the vertex that stands for `point`: its tag, turned towards the surface's own `estimate`
@@ -191,7 +194,7 @@ class Pipeline {
     [[nodiscard]] std::vector<Vector3d> guiding_normals() const {
         std::vector<VertexId> slots;
         const common::TriangleMesh mesh = surface_.mesh.extract(&slots);
-        const std::vector<Vector3d> estimates = vertex_normals(mesh);
+        const std::vector<Vector3d> estimates = common::vertex_normals(mesh);
         std::vector<Vector3d> normals(surface_.mesh.vertex_slots(), Vector3d::Zero());
         for (std::size_t i = 0; i < slots.size(); ++i) {
             normals[slots[i]] = normal_at(surface_.point_of_vertex[slots[i]], estimates[i], 0.0);
@@ -251,11 +254,9 @@ class Pipeline {
     // DESIGN section 7, in full from a third of the vertices lost.
     void conceal_missing(Extracted& extracted) const {
         if (!options_.conceal || points_.empty()) return;
-        const double loss =
-            1.0 - static_cast<double>(points_.size()) / static_cast<double>(object_.hint.vertices);
-        if (!(loss > 0.0)) return;
+        if (!(loss() > 0.0)) return;
         stage("conceal");
-        const std::vector<Vector3d> estimates = vertex_normals(extracted.mesh);
+        const std::vector<Vector3d> estimates = common::vertex_normals(extracted.mesh);
         const common::TriangleTree unwrapped(unwrapped_);
         const common::TriangleTree wrapped(coarse_->mesh);
         const double doubt =
@@ -270,7 +271,7 @@ class Pipeline {
                 }
             });
         extracted.mesh = conceal(extracted.mesh, std::move(known), {&wrapped, coarse_->cell},
-                                 std::min(1.0, kStrengthPerLoss * loss), options_.threads);
+                                 std::min(1.0, kStrengthPerLoss * loss()), options_.threads);
         extracted.point.resize(extracted.mesh.positions.size(), kNone);
     }
 

@@ -9,9 +9,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "common/diagonal_choice.hpp"
 #include "common/object_id.hpp"
 #include "common/random.hpp"
 #include "protocol/object_table.hpp"
+#include "sender/diagonal_rule.hpp"
 #include "sender/importance_order.hpp"
 #include "sender/spread_order.hpp"
 #include "sender/surface_decimation.hpp"
@@ -26,6 +28,14 @@ constexpr double kFloatMax = std::numeric_limits<float>::max();
 /// exact (Sterbenz: y/2 <= x <= 2y makes x - y exact) and x = record + origin bit for bit. Without
 /// an origin a record keeps float32 input as it is; either way the rounding error is below 4 half
 /// extents * 2^-24.
+/// Needed at all only where a coordinate is no float32: whoever misses every description would
+/// otherwise have the model in the wrong place for nothing.
+bool all_are_floats(const std::vector<Eigen::Vector3d>& positions) {
+    return std::all_of(positions.begin(), positions.end(), [](const Eigen::Vector3d& x) {
+        return (x.array() == x.cast<float>().cast<double>().array()).all();
+    });
+}
+
 double origin_on_axis(double low, double high) {
     const double half = 0.5 * high - 0.5 * low;
     const double center = 0.5 * low + 0.5 * high;
@@ -134,9 +144,9 @@ std::vector<protocol::VertexRecord> solid_records(const PreparedModel& model,
 }
 
 /// Equal records of the model's vertices once, in the order asked for.
-std::vector<protocol::VertexRecord> ordered_records(
-    const PreparedModel& model, std::vector<protocol::VertexRecord> records,
-    const ObjectOptions& options) {
+std::vector<protocol::VertexRecord> ordered_records(const PreparedModel& model,
+                                                    std::vector<protocol::VertexRecord> records,
+                                                    const ObjectOptions& options) {
     const std::vector<std::uint32_t> first_equal = first_equals(records);
     if (options.order == SendingOrder::importance) {
         records = picked(records, by_importance(model, first_equal));
@@ -189,7 +199,8 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     object.description.sender_version = "ellicast " ELLICAST_VERSION;
 
     const Eigen::AlignedBox3d box = common::bounding_box(model.vertices);
-    for (int axis = 0; axis < 3 && !box.isEmpty(); ++axis) {
+    const bool exact = all_are_floats(model.vertices);
+    for (int axis = 0; axis < 3 && !box.isEmpty() && !exact; ++axis) {
         object.description.origin[static_cast<std::size_t>(axis)] =
             origin_on_axis(box.min()[axis], box.max()[axis]);
     }
@@ -201,6 +212,8 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     records.resize(model.vertices.size());
     object.hint.format = record_format(options.tags, model);
     set_tags(object.hint.format, model, records, object.vertices);
+    static_assert(common::kDiagonalRules == protocol::kDiagonalRules);
+    object.hint.diagonals = best_diagonal_rule(model.solid, object.hint.format.normal_bits);
 
     object.hint.components = promise.components;
     object.hint.euler_all = promise.euler_all;

@@ -201,13 +201,19 @@ TEST_CASE("a topology that no closed surface has is a bad hint") {
                               std::numeric_limits<std::int32_t>::min()));
 }
 
-TEST_CASE("an unknown record format is a bad hint") {
+TEST_CASE("an unknown diagonal rule is a bad hint") {
     constexpr std::size_t kFormatOffset = 72;
-    for (int format = 16; format < 256; ++format) {
-        CAPTURE(format);
-        const auto code = static_cast<std::uint8_t>(format);
+    for (int byte = 16 * kDiagonalRules; byte < 256; ++byte) {
+        CAPTURE(byte);
+        const auto code = static_cast<std::uint8_t>(byte);
         CHECK(with_byte(kFormatOffset, code) == WireError::bad_hint);
         CHECK_FALSE(RecordFormat::of_code(code).is_known());
+    }
+}
+
+TEST_CASE("every diagonal rule arrives, whatever the record format") {
+    for (std::uint8_t rule = 0; rule < kDiagonalRules; ++rule) {
+        CHECK(with_hint([&](Hint& h) { h.diagonals = rule; }) == std::nullopt);
     }
 }
 
