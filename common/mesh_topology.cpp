@@ -236,34 +236,74 @@ Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh) {
     return box;
 }
 
-SelfIntersections count_self_intersections(const TriangleMesh& mesh, unsigned threads) {
+namespace {
+
+struct Marked {
+    std::size_t pairs = 0;
+    std::vector<std::uint8_t> faces;  // 1: in a pair
+};
+
+/// Pairs with at least one of `suspects`, which are ascending; each once.
+Marked mark_self_intersections(const TriangleMesh& mesh, std::span<const std::uint32_t> suspects,
+                               unsigned threads) {
     const TriangleTree tree(mesh);
-    SelfIntersections result;
-    std::vector<std::uint8_t> marked(mesh.triangles.size(), 0);
+    std::vector<std::uint8_t> suspected(mesh.triangles.size(), 0);
+    for (const std::uint32_t f : suspects) suspected[f] = 1;
+    Marked result;
+    result.faces.assign(mesh.triangles.size(), 0);
     std::mutex merging;
-    parallel_for(mesh.triangles.size(), threads, [&](std::size_t begin, std::size_t end) {
+    parallel_for(suspects.size(), threads, [&](std::size_t begin, std::size_t end) {
         std::size_t pairs = 0;
-        std::vector<std::uint8_t> own_marks(mesh.triangles.size(), 0);
+        std::vector<std::uint32_t> found;
         std::vector<std::uint32_t> candidates;
-        for (std::size_t f = begin; f < end; ++f) {
+        for (const std::uint32_t f : suspects.subspan(begin, end - begin)) {
             const Triangle& t = mesh.triangles[f];
             const TriangleCorners corners = corners_of(mesh, t);
             tree.find_meeting(box_of(corners), candidates);
             for (const std::uint32_t other : candidates) {
-                if (other <= f || share_vertex(t, mesh.triangles[other])) continue;
+                const bool counted_there = suspected[other] != 0 && other <= f;
+                if (counted_there || share_vertex(t, mesh.triangles[other])) continue;
                 if (!triangles_meet(corners, corners_of(mesh, mesh.triangles[other]))) continue;
                 ++pairs;
-                own_marks[f] = own_marks[other] = 1;
+                found.push_back(f);
+                found.push_back(other);
             }
         }
         // Sums and unions: the order of the threads does not show.
         const std::lock_guard lock(merging);
         result.pairs += pairs;
-        for (std::size_t f = 0; f < marked.size(); ++f) marked[f] |= own_marks[f];
+        for (const std::uint32_t f : found) result.faces[f] = 1;
     });
-    result.faces =
-        static_cast<std::size_t>(std::count(marked.begin(), marked.end(), std::uint8_t{1}));
     return result;
+}
+
+std::vector<std::uint32_t> all_faces(const TriangleMesh& mesh) {
+    std::vector<std::uint32_t> faces(mesh.triangles.size());
+    std::iota(faces.begin(), faces.end(), 0u);
+    return faces;
+}
+
+}  // namespace
+
+SelfIntersections count_self_intersections(const TriangleMesh& mesh, unsigned threads) {
+    const Marked marked = mark_self_intersections(mesh, all_faces(mesh), threads);
+    return {marked.pairs, static_cast<std::size_t>(std::count(
+                              marked.faces.begin(), marked.faces.end(), std::uint8_t{1}))};
+}
+
+std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh,
+                                                   std::span<const std::uint32_t> suspects,
+                                                   unsigned threads) {
+    const Marked marked = mark_self_intersections(mesh, suspects, threads);
+    std::vector<std::uint32_t> faces;
+    for (std::uint32_t f = 0; f < marked.faces.size(); ++f) {
+        if (marked.faces[f] != 0) faces.push_back(f);
+    }
+    return faces;
+}
+
+std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh, unsigned threads) {
+    return self_intersecting_faces(mesh, all_faces(mesh), threads);
 }
 
 double signed_volume(const TriangleMesh& mesh) {

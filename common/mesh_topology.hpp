@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/triangle_mesh.hpp"
@@ -55,5 +56,13 @@ struct SelfIntersections {
     std::size_t faces = 0;
 };
 SelfIntersections count_self_intersections(const TriangleMesh& mesh, unsigned threads = 0);
+
+/// The triangles in such pairs, ascending.
+std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh, unsigned threads = 0);
+
+/// Those in pairs with at least one of `suspects`. Cost: a tree, and a search for each suspect.
+std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh,
+                                                   std::span<const std::uint32_t> suspects,
+                                                   unsigned threads = 0);
 
 }  // namespace ellicast::common

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/mesh_topology.hpp"
 #include "common/parallel.hpp"
 #include "common/vertex_normals.hpp"
 
@@ -31,6 +32,7 @@ constexpr double kLeastBulge = 0.013;
 // The most that a midpoint may leave its edge, as a share of the edge.
 constexpr double kMostBulge = 0.15;
 constexpr int kMostLevels = 3;
+constexpr int kMostHalvings = 3;
 // An edge is split again when it is longer than this many cells of the coarse surface.
 constexpr double kLongEdge = 2.0;
 
@@ -175,8 +177,9 @@ void cut(const Triangle& t, const std::array<std::uint32_t, 3>& middle,
 }
 
 // Gives every edge with a bulge its midpoint. Normals of new vertices are left open.
-void split(const std::vector<Edge>& edges, const std::vector<Vector3d>& bulges, TriangleMesh& mesh,
-           std::vector<KnownVertex>& vertices) {
+void split(const std::vector<Edge>& edges, const std::vector<Vector3d>& bulges,
+           Concealed& concealed, std::vector<KnownVertex>& vertices) {
+    TriangleMesh& mesh = concealed.mesh;
     std::vector<std::array<std::uint32_t, 3>> midpoints(mesh.triangles.size(),
                                                         {kNoMidpoint, kNoMidpoint, kNoMidpoint});
     for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -185,6 +188,7 @@ void split(const std::vector<Edge>& edges, const std::vector<Vector3d>& bulges, 
         const auto v = static_cast<std::uint32_t>(mesh.positions.size());
         const Vector3d middle = 0.5 * (mesh.positions[e.a] + mesh.positions[e.b]);
         mesh.positions.push_back(middle + bulges[k]);
+        concealed.parents.push_back({e.a, e.b});
         vertices.push_back({Vector3d::Zero(), 0.5 * (vertices[e.a].doubt + vertices[e.b].doubt)});
         for (std::size_t side = 0; side < 2; ++side) {
             midpoints[e.triangle[side]][e.corner[side]] = v;
@@ -200,25 +204,69 @@ void split(const std::vector<Edge>& edges, const std::vector<Vector3d>& bulges, 
 
 }  // namespace
 
-TriangleMesh conceal(const TriangleMesh& mesh, std::vector<KnownVertex> vertices,
-                     const ShapeGuide& guide, double strength, unsigned threads) {
+Concealed conceal(const TriangleMesh& mesh, std::vector<KnownVertex> vertices,
+                  const ShapeGuide& guide, double strength, unsigned threads) {
     assert(vertices.size() == mesh.positions.size());
     assert(guide.surface && guide.cell > 0.0);
-    TriangleMesh result = mesh;
+    Concealed result{mesh, {}};
     for (int n = 0; n < kMostLevels; ++n) {
-        const std::vector<Edge> edges = edges_of(result);
-        const Level level(result, vertices, guide, n == 0);
+        const std::vector<Edge> edges = edges_of(result.mesh);
+        const Level level(result.mesh, vertices, guide, n == 0);
         std::vector<Vector3d> bulges(edges.size());
         common::parallel_for(edges.size(), threads, [&](std::size_t begin, std::size_t end) {
             for (std::size_t k = begin; k < end; ++k) bulges[k] = strength * level.bulge(edges[k]);
         });
-        const std::size_t before = result.positions.size();
+        const std::size_t before = result.mesh.positions.size();
         split(edges, bulges, result, vertices);
-        if (result.positions.size() == before) break;
-        const std::vector<Vector3d> normals = common::vertex_normals(result);
+        if (result.mesh.positions.size() == before) break;
+        const std::vector<Vector3d> normals = common::vertex_normals(result.mesh);
         for (std::size_t v = before; v < vertices.size(); ++v) vertices[v].normal = normals[v];
     }
     return result;
+}
+
+std::size_t flatten_intersections(Concealed& concealed, unsigned threads) {
+    TriangleMesh& mesh = concealed.mesh;
+    const auto& parents = concealed.parents;
+    const std::size_t known = mesh.positions.size() - parents.size();
+    const auto middle = [&](std::size_t k) -> Vector3d {
+        return 0.5 * (mesh.positions[parents[k][0]] + mesh.positions[parents[k][1]]);
+    };
+    std::vector<Vector3d> bulges(parents.size());
+    for (std::size_t k = 0; k < parents.size(); ++k)
+        bulges[k] = mesh.positions[known + k] - middle(k);
+    std::vector<int> halvings(parents.size(), 0);
+    std::vector<std::uint32_t> faces = common::self_intersecting_faces(mesh, threads);
+    for (;;) {
+        std::vector<bool> moved(mesh.positions.size(), false);
+        bool news = false;
+        for (const std::uint32_t f : faces) {
+            for (const std::uint32_t v : mesh.triangles[f]) {
+                if (v < known || moved[v] || halvings[v - known] > kMostHalvings) continue;
+                if (++halvings[v - known] > kMostHalvings) {
+                    bulges[v - known].setZero();
+                } else {
+                    bulges[v - known] *= 0.5;
+                }
+                moved[v] = news = true;
+            }
+        }
+        if (!news) return faces.size();
+        // Parents come before their children, which go along.
+        for (std::size_t k = 0; k < parents.size(); ++k) {
+            const std::size_t v = known + k;
+            moved[v] = moved[v] || moved[parents[k][0]] || moved[parents[k][1]];
+            if (moved[v]) mesh.positions[v] = middle(k) + bulges[k];
+        }
+        std::vector<std::uint32_t> suspects;
+        for (std::uint32_t f = 0, next = 0; f < mesh.triangles.size(); ++f) {
+            while (next < faces.size() && faces[next] < f) ++next;
+            const auto& t = mesh.triangles[f];
+            const bool before = next < faces.size() && faces[next] == f;
+            if (before || moved[t[0]] || moved[t[1]] || moved[t[2]]) suspects.push_back(f);
+        }
+        faces = common::self_intersecting_faces(mesh, suspects, threads);
+    }
 }
 
 }  // namespace ellicast::receiver

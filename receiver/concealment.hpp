@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "common/triangle_mesh.hpp"
@@ -28,7 +31,18 @@ struct KnownVertex {
 /// the mesh stay bit for bit and keep their places; guessed ones follow. Edges that would not bulge
 /// are not split; triangles are cut to fit: a closed manifold stays one, of the same topology.
 /// `strength` scales the bulge, 0 to 1. Cost: linear, and a search of the guide per edge.
-common::TriangleMesh conceal(const common::TriangleMesh& mesh, std::vector<KnownVertex> vertices,
-                             const ShapeGuide& guide, double strength, unsigned threads);
+struct Concealed {
+    common::TriangleMesh mesh;
+    /// Of guessed vertex k, at position (known vertices) + k: the ends of the edge that it split.
+    std::vector<std::array<std::uint32_t, 2>> parents;
+};
+Concealed conceal(const common::TriangleMesh& mesh, std::vector<KnownVertex> vertices,
+                  const ShapeGuide& guide, double strength, unsigned threads);
+
+/// Where triangles intersect, halves the bulge of guessed vertices, up to three times and then all
+/// of it. What intersects without a guess stays as it is. Returns how many triangles still do, as
+/// count_self_intersections() counts. Cost: a search for every triangle, and a few for those that
+/// move.
+std::size_t flatten_intersections(Concealed& concealed, unsigned threads);
 
 }  // namespace ellicast::receiver

@@ -270,8 +270,10 @@ class Pipeline {
                         std::sqrt(unwrapped.closest(extracted.mesh.positions[v]).squared_distance);
                 }
             });
-        extracted.mesh = conceal(extracted.mesh, std::move(known), {&wrapped, coarse_->cell},
-                                 std::min(1.0, kStrengthPerLoss * loss()), options_.threads);
+        Concealed concealed = conceal(extracted.mesh, std::move(known), {&wrapped, coarse_->cell},
+                                      std::min(1.0, kStrengthPerLoss * loss()), options_.threads);
+        flatten_intersections(concealed, options_.threads);
+        extracted.mesh = std::move(concealed.mesh);
         extracted.point.resize(extracted.mesh.positions.size(), kNone);
     }
 
