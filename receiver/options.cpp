@@ -41,6 +41,7 @@ struct Texts {
     std::string reference;
     std::string stages;
     std::string report;
+    std::string conceal = "on";
     double idle_timeout = 2.0;
     double wait = -1.0;
 };
@@ -88,6 +89,11 @@ void add_receiver_options(CLI::App& app, Options& options, Texts& texts) {
         ->type_name("CELLS")
         ->check(CLI::Range(8, 512))
         ->capture_default_str();
+    app.add_option("--conceal", texts.conceal,
+                   "Guess vertices that did not arrive, between those that did")
+        ->type_name("on|off")
+        ->check(CLI::IsMember({"on", "off"}).description(""))
+        ->capture_default_str();
     app.add_option("--until", options.session.until, "When to stop receiving")
         ->type_name("RULE")
         ->transform(CLI::CheckedTransformer(kUntil).description("{end,complete,round,forever}"))
@@ -131,6 +137,7 @@ void interpret(const Texts& texts, Options& options) {
     options.reference = path_of(texts.reference);
     options.stages = path_of(texts.stages);
     options.report = path_of(texts.report);
+    options.conceal = texts.conceal == "on";
     options.session.idle_timeout = to_time(texts.idle_timeout);
     if (texts.wait > 0) options.session.wait = to_time(texts.wait);
 }

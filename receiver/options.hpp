@@ -19,6 +19,7 @@ struct Options {
     std::optional<std::filesystem::path> stages;  // directory
     std::optional<std::filesystem::path> report;
     int grid = 96;
+    bool conceal = true;
     unsigned threads = 0;  // 0: one per core
     std::string log_level = "info";
     bool quiet = false;

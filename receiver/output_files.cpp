@@ -72,12 +72,8 @@ common::PlyOptions ply_options(const Reconstruction& reconstruction, const Recei
     return options;
 }
 
-/// With what the result's vertices have beside positions.
-common::PlyOptions result_options(const Reconstruction& reconstruction,
-                                  const ReceivedObject& object) {
-    common::PlyOptions options = ply_options(reconstruction, object);
-    const std::vector<common::Colour> colours = vertex_colours(reconstruction, object);
-    if (colours.empty()) return options;
+void add_colours(const std::vector<common::Colour>& colours, common::PlyOptions& options) {
+    if (colours.empty()) return;
     constexpr std::array<const char*, 3> kChannels{"red", "green", "blue"};
     for (std::size_t k = 0; k < kChannels.size(); ++k) {
         common::PlyByteProperty& property = options.byte_properties.emplace_back();
@@ -85,6 +81,26 @@ common::PlyOptions result_options(const Reconstruction& reconstruction,
         property.values.reserve(colours.size());
         for (const common::Colour& colour : colours) property.values.push_back(colour[k]);
     }
+}
+
+void add_confidence(const Reconstruction& reconstruction, common::PlyOptions& options) {
+    const std::vector<Provenance>& provenance = reconstruction.provenance;
+    const bool measured = std::all_of(provenance.begin(), provenance.end(),
+                                      [](Provenance p) { return p == Provenance::received; });
+    if (measured && reconstruction.summary.missing == 0) return;
+    common::PlyByteProperty& property = options.byte_properties.emplace_back();
+    property.name = "provenance";
+    for (const Provenance p : provenance) property.values.push_back(static_cast<std::uint8_t>(p));
+    options.properties.push_back({"distance_to_received", reconstruction.confidence.distance});
+    options.properties.push_back({"confidence", reconstruction.confidence.completeness});
+}
+
+/// With what the result's vertices have beside positions.
+common::PlyOptions result_options(const Reconstruction& reconstruction,
+                                  const ReceivedObject& object) {
+    common::PlyOptions options = ply_options(reconstruction, object);
+    add_colours(vertex_colours(reconstruction, object), options);
+    add_confidence(reconstruction, options);
     return options;
 }
 

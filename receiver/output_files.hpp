@@ -35,7 +35,11 @@ void check_writable_file(const std::filesystem::path& path);
 void check_writable_directory(const std::filesystem::path& path);
 
 /// Writes the result; float32 unless that would move a received vertex (a large origin), double
-/// then; with uchar red, green, blue when the object has colours (receiver/vertex_colours.hpp).
+/// then; with uchar red, green, blue when the object has colours (receiver/vertex_colours.hpp), and
+/// unless every vertex was received and none is missing with
+///   uchar provenance              0 received, 1 concealed, 2 coarse: Provenance
+///   float distance_to_received    Confidence::distance, model units
+///   float confidence              Confidence::completeness, 0 to 1
 /// Atomic. Throws common::ModelError.
 void write_mesh(const std::filesystem::path& path, const Reconstruction& reconstruction,
                 const ReceivedObject& object);

@@ -109,6 +109,7 @@ std::optional<Reconstruction> rebuild(const Options& options, const ReceivedObje
     ReconstructionOptions how;
     how.grid = options.grid;
     how.threads = options.threads;
+    how.conceal = options.conceal;
     how.keep_stages = options.stages.has_value();
     ProgressLine progress(!options.quiet);
     how.on_stage = [&](const char* stage) {

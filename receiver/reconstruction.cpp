@@ -283,10 +283,14 @@ class Pipeline {
         stage("finish");
         Reconstruction result;
         Extracted extracted = extract();
+        const std::size_t unguessed = extracted.point.size();
         conceal_missing(extracted);
         result.mesh = to_model_frame(extracted.mesh);
         for (std::size_t i = 0; i < extracted.point.size(); ++i) {
             const std::uint32_t point = extracted.point[i];
+            result.provenance.push_back(point != kNone  ? Provenance::received
+                                        : i < unguessed ? Provenance::coarse
+                                                        : Provenance::concealed);
             result.vertex_index.push_back(point == kNone ? kNotReceived
                                                          : object_.vertex_index[point]);
             if (point != kNone) {
@@ -301,7 +305,24 @@ class Pipeline {
         result.judged = !object_.hint.approximate;
         result.isolevel = static_cast<float>(coarse_->isolevel * frame_.diagonal);
         if (options_.keep_stages) result.stages = std::move(stages_);
+        judge_confidence(result);
         return result;
+    }
+
+    void judge_confidence(Reconstruction& result) const {
+        stage("confidence");
+        std::vector<std::uint32_t> received;
+        for (std::uint32_t v = 0; v < result.vertex_index.size(); ++v) {
+            if (result.vertex_index[v] != kNotReceived) received.push_back(v);
+        }
+        const std::size_t expected = object_.hint.vertices;
+        const std::size_t missing = expected - std::min(expected, points_.size());
+        result.confidence = measure_confidence(result.mesh, received, missing, options_.threads);
+        const auto& lo = object_.hint.box_min;
+        const auto& hi = object_.hint.box_max;
+        const Eigen::AlignedBox3d box(origin() + Vector3d(lo[0], lo[1], lo[2]),
+                                      origin() + Vector3d(hi[0], hi[1], hi[2]));
+        result.summary = summarise(result.confidence, result.mesh, received, missing, box);
     }
 
     [[nodiscard]] bool as_promised(const common::MeshTopology& topology) const {

@@ -10,6 +10,7 @@
 
 #include "common/mesh_topology.hpp"
 #include "common/triangle_mesh.hpp"
+#include "receiver/confidence.hpp"
 #include "receiver/received_object.hpp"
 
 namespace ellicast::receiver {
@@ -17,7 +18,7 @@ namespace ellicast::receiver {
 struct ReconstructionOptions {
     int grid = 96;         // cells of the distance grid along the longest axis of the hinted box
     unsigned threads = 0;  // does not change the result
-    bool conceal = true;   // guess the missing vertices
+    bool conceal = true;   // guess the missing vertices; changes nothing when none is missing
     bool keep_stages = false;
     /// Called with the name of the stage that begins; for progress and timing. May be empty.
     std::function<void(const char* stage)> on_stage = {};
@@ -30,9 +31,19 @@ struct Stages {
     common::TriangleMesh halfway;  // the first chunk inserted, marching-cubes vertices still in
 };
 
+/// Where a vertex of the result comes from. The values are those of the written PLY.
+enum class Provenance : std::uint8_t {
+    received = 0,   // measured: a record, in its place
+    concealed = 1,  // guessed on an edge between other vertices (receiver/concealment.hpp)
+    coarse = 2,  // of the marching-cubes mesh, from ellipsoids; stayed where nothing else is near
+};
+
 struct Reconstruction {
     common::TriangleMesh mesh;                // positions = float32 record + origin
     std::vector<std::uint32_t> vertex_index;  // per position: record index, or kNotReceived
+    std::vector<Provenance> provenance;       // per position
+    Confidence confidence;                    // per position; model units
+    ConfidenceSummary summary;
     std::vector<std::uint32_t> not_inserted;  // record indices that are no vertex of the mesh
     common::MeshTopology topology;
     bool topology_as_promised =

@@ -92,9 +92,37 @@ void add_records(const ReportContent& content, Json& report) {
                         {"over_limit", session.store.over_limit}};
 }
 
+Json confidence_json(const Reconstruction& reconstruction) {
+    const ConfidenceSummary& summary = reconstruction.summary;
+    const auto vertices = [&](Provenance kind) {
+        const auto& all = reconstruction.provenance;
+        return std::count(all.begin(), all.end(), kind);
+    };
+    Json json = {{"missing", summary.missing},
+                 {"received", vertices(Provenance::received)},
+                 {"concealed", vertices(Provenance::concealed)},
+                 {"coarse", vertices(Provenance::coarse)},
+                 {"largest_gap", nullptr},
+                 {"farther", Json::array()},
+                 {"octants", Json::array()}};
+    if (summary.largest_gap) {
+        const Eigen::Vector3d& x = summary.largest_gap->center;
+        json["largest_gap"] = {{"center", {x[0], x[1], x[2]}},
+                               {"radius", summary.largest_gap->radius}};
+    }
+    for (const FartherShare& farther : summary.farther) {
+        json["farther"].push_back({{"distance", farther.distance}, {"share", farther.share}});
+    }
+    for (const OctantCount& octant : summary.octants) {
+        json["octants"].push_back({{"received", octant.received}, {"expected", octant.expected}});
+    }
+    return json;
+}
+
 void add_mesh(const ReportContent& content, Json& report) {
     if (!content.reconstruction) {
         report["mesh"] = nullptr;
+        report["confidence"] = nullptr;
         report["not_inserted"] = Json::array();
         return;
     }
@@ -109,6 +137,7 @@ void add_mesh(const ReportContent& content, Json& report) {
                       {"topology_as_promised", reconstruction.topology_as_promised},
                       {"judged", reconstruction.judged},
                       {"isolevel", reconstruction.isolevel}};
+    report["confidence"] = confidence_json(reconstruction);
     report["not_inserted"] = reconstruction.not_inserted;
 }
 
@@ -157,6 +186,27 @@ std::string mesh_line(const ReportContent& content) {
         verdict);
 }
 
+// What is missing, and where; "" when nothing is.
+std::string missing_line(const ReportContent& content) {
+    const Reconstruction& reconstruction = *content.reconstruction;
+    const ConfidenceSummary& summary = reconstruction.summary;
+    if (summary.missing == 0) return "";
+    std::string line = fmt::format("{} missing", plural(summary.missing, "vertex", "vertices"));
+    const auto& kinds = reconstruction.provenance;
+    const auto guessed =
+        static_cast<std::size_t>(std::count(kinds.begin(), kinds.end(), Provenance::concealed));
+    if (guessed > 0) line += fmt::format(", {} guessed", guessed);
+    if (summary.largest_gap) {
+        const Eigen::Vector3d& x = summary.largest_gap->center;
+        line += fmt::format("; largest gap: radius {:.3g} at ({:.4g}, {:.4g}, {:.4g})",
+                            summary.largest_gap->radius, x[0], x[1], x[2]);
+    }
+    const FartherShare& farther = summary.farther[1];
+    line += fmt::format("; {:.1f} % of the surface farther than {:.3g} from a received vertex",
+                        100.0 * farther.share, farther.distance);
+    return line + "\n";
+}
+
 }  // namespace
 
 nlohmann::ordered_json make_report(const ReportContent& content) {
@@ -198,7 +248,7 @@ std::string summary_text(const ReportContent& content) {
                        object.ellipsoids.size(), object.hint.ellipsoids, object.vertices.size(),
                        object.hint.vertices) +
            text;
-    if (content.reconstruction) text += mesh_line(content);
+    if (content.reconstruction) text += mesh_line(content) + missing_line(content);
     if (content.quality) {
         const common::MeshDistance& q = *content.quality;
         text += fmt::format(

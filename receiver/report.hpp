@@ -50,6 +50,12 @@ struct ReportContent {
 ///   others        {groups, datagrams, contradictory_hints, evicted, over_limit}: strangers
 ///   mesh          {vertices, faces, components, genus, closed, manifold, topology_as_promised,
 ///                   judged, isolevel}, or null; judged is false for an approximate promise
+///   confidence    {missing, received, concealed, coarse, largest_gap, farther, octants}, or null
+///                 missing: vertices that did not arrive; received, concealed, coarse: vertices of
+///                   the mesh by Provenance; largest_gap: {center, radius}, null when none is
+///                   missing; farther: [{distance, share}], of the surface; octants: [{received,
+///                   expected}], of the hinted box, x fastest. All in model units, as explained in
+///                   receiver/confidence.hpp
 ///   not_inserted  indices of received vertices that are no vertex of the mesh
 ///   quality       {rms, mean, max, rms_to_reference, rms_from_reference, normal_deg}: shares of
 ///                   the reference's diagonal, degrees; only with a reference and a mesh

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "receiver/vertex_neighbours.hpp"
+
 namespace ellicast::receiver {
 namespace {
 
@@ -36,40 +38,15 @@ class Mean {
     std::uint64_t count_ = 0;
 };
 
-/// Neighbours of each vertex, those of v from first[v] to first[v + 1]. In a closed mesh every edge
-/// is there once in each direction.
-struct Neighbours {
-    std::vector<std::size_t> first;
-    std::vector<std::uint32_t> vertices;
-};
-
-Neighbours neighbours_of(const common::TriangleMesh& mesh) {
-    Neighbours result;
-    result.first.assign(mesh.positions.size() + 1, 0);
-    for (const common::Triangle& t : mesh.triangles) {
-        for (const std::uint32_t v : t) ++result.first[v + 1];
-    }
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-        result.first[v + 1] += result.first[v];
-    }
-    result.vertices.resize(3 * mesh.triangles.size());
-    std::vector<std::size_t> next(result.first.begin(), result.first.end() - 1);
-    for (const common::Triangle& t : mesh.triangles) {
-        for (std::size_t c = 0; c < 3; ++c) result.vertices[next[t[c]]++] = t[(c + 1) % 3];
-    }
-    return result;
-}
-
 /// Gives all vertices that received ones can be reached from a colour, one ring after another.
 void spread(const common::TriangleMesh& mesh, std::vector<std::uint32_t> ring,
             std::vector<bool>& coloured, std::vector<Colour>& colours) {
-    const Neighbours neighbours = neighbours_of(mesh);
+    const VertexNeighbours neighbours(mesh);
     std::vector<Mean> means(mesh.positions.size());
     while (!ring.empty()) {
         std::vector<std::uint32_t> next;
         for (const std::uint32_t v : ring) {
-            for (std::size_t k = neighbours.first[v]; k < neighbours.first[v + 1]; ++k) {
-                const std::uint32_t other = neighbours.vertices[k];
+            for (const std::uint32_t other : neighbours.of(v)) {
                 if (coloured[other]) continue;
                 if (!means[other].any()) next.push_back(other);
                 means[other].add(colours[v]);
