@@ -110,3 +110,39 @@ TEST_CASE("estimated vertices alone need double only far from the origin") {
     const std::string header = tests::read_file(path).substr(0, 300);
     CHECK((header.find("double x") != std::string::npos) == (far > 1));
 }
+
+TEST_CASE("the file says what is measured and what is guessed, unless all is measured") {
+    const tests::TemporaryDirectory directory;
+    const fs::path path = directory.path() / "x.ply";
+    Received received(Eigen::Vector3d::Zero());
+    Reconstruction& reconstruction = received.reconstruction;
+    const std::size_t n = reconstruction.mesh.positions.size();
+    reconstruction.provenance.assign(n, Provenance::received);
+    reconstruction.confidence.distance.assign(n, 0.5F);
+    reconstruction.confidence.completeness.assign(n, 0.25F);
+    const auto header = [&] {
+        write_mesh(path, reconstruction, received.object);
+        const std::string bytes = tests::read_file(path);
+        return bytes.substr(0, bytes.find("end_header"));
+    };
+    const auto marked = [](const std::string& text) {
+        return text.find("property uchar provenance\n") != std::string::npos &&
+               text.find("property float distance_to_received\n") != std::string::npos &&
+               text.find("property float confidence\n") != std::string::npos;
+    };
+    CHECK(header().find("provenance") == std::string::npos);
+    CHECK(header().find("confidence") == std::string::npos);
+    reconstruction.summary.missing = 1;
+    CHECK(marked(header()));
+    reconstruction.summary.missing = 0;
+    reconstruction.provenance[3] = Provenance::coarse;
+    CHECK(marked(header()));
+    CHECK(common::read_model(path).positions == reconstruction.mesh.positions);
+    // The last vertex: 3 floats, 2 floats, the byte.
+    reconstruction.provenance[n - 1] = Provenance::concealed;
+    const std::size_t body = header().size() + std::string("end_header\n").size();
+    const std::string bytes = tests::read_file(path);
+    CHECK(bytes.at(body + 21 * n - 1) == 1);
+    CHECK(bytes.at(body + 21 * 4 - 1) == 2);
+    CHECK(bytes.at(body + 21 * 5 - 1) == 0);
+}

@@ -130,6 +130,9 @@ TEST_CASE("threads, stages and a missing description change no bit of the mesh")
         REQUIRE(one->mesh.positions == other->mesh.positions);
         REQUIRE(one->mesh.triangles == other->mesh.triangles);
         REQUIRE(one->vertex_index == other->vertex_index);
+        REQUIRE(one->provenance == other->provenance);
+        REQUIRE(one->confidence.distance == other->confidence.distance);
+        REQUIRE(one->confidence.completeness == other->confidence.completeness);
     }
     REQUIRE_FALSE(one->stages);
     REQUIRE(many->stages);
@@ -137,6 +140,44 @@ TEST_CASE("threads, stages and a missing description change no bit of the mesh")
     REQUIRE(common::analyse_topology(many->stages->halfway).manifold);
     REQUIRE(common::analyse_topology(many->stages->ellipsoids).components ==
             part.ellipsoids.size());
+}
+
+TEST_CASE("every vertex says whether it was received, guessed or coarse") {
+    const sender::BroadcastObject object = object_of(tests::torus(1, 0.4, 60, 30));
+    const double loss = GENERATE(0.0, 0.4, 0.97, 1.0);
+    const bool conceal = GENERATE(true, false);
+    CAPTURE(loss, conceal);
+    const ReceivedObject part = received(object, 0, loss, 3);
+    const std::optional<Reconstruction> result = reconstruct(part, {.conceal = conceal});
+    REQUIRE(result);
+    const std::size_t n = result->mesh.positions.size();
+    REQUIRE(result->provenance.size() == n);
+    REQUIRE(result->confidence.distance.size() == n);
+    REQUIRE(result->confidence.completeness.size() == n);
+    std::array<std::size_t, 3> count{};
+    for (std::size_t v = 0; v < n; ++v) {
+        const Provenance provenance = result->provenance[v];
+        ++count[static_cast<std::size_t>(provenance)];
+        REQUIRE((provenance == Provenance::received) == (result->vertex_index[v] != kNotReceived));
+        REQUIRE((provenance == Provenance::received) == (result->confidence.distance[v] == 0.0F));
+    }
+    CHECK(count[0] == part.vertices.size() - result->not_inserted.size());
+    CHECK((count[1] > 0) == (conceal && loss > 0.0 && loss < 1.0));
+    if (loss == 0.0) CHECK(count[2] == 0);
+    if (loss > 0.9) CHECK(count[2] > 0);
+    CHECK(result->summary.missing == object.vertices.size() - part.vertices.size());
+    CHECK(result->summary.largest_gap.has_value() == (loss > 0.0));
+}
+
+TEST_CASE("with nothing missing, concealment changes no bit") {
+    const sender::BroadcastObject object = object_of(tests::torus(1, 0.4, 40, 20));
+    const ReceivedObject all = received(object, 0.2, 0, 1);
+    const std::optional<Reconstruction> on = reconstruct(all);
+    const std::optional<Reconstruction> off = reconstruct(all, {.conceal = false});
+    REQUIRE(on);
+    REQUIRE(off);
+    CHECK(on->mesh.positions == off->mesh.positions);
+    CHECK(on->mesh.triangles == off->mesh.triangles);
 }
 
 TEST_CASE("a model far from the origin comes back bit for bit") {

@@ -31,6 +31,12 @@ struct Run {
         object.vertex_index = {1, 3, 5, 7};
         reconstruction.vertex_index = {1, kNotReceived, 3, 5};
         reconstruction.not_inserted = {7};
+        reconstruction.provenance = {Provenance::received, Provenance::concealed,
+                                     Provenance::received, Provenance::received};
+        reconstruction.summary.missing = 6;
+        reconstruction.summary.largest_gap = {Eigen::Vector3d(1, 2, 0.5), 0.25};
+        reconstruction.summary.farther[1] = {0.125, 0.375};
+        reconstruction.summary.octants[5] = {3, 7.5};
         reconstruction.topology.components = 1;
         reconstruction.topology.euler = -6;
         reconstruction.topology.closed = reconstruction.topology.manifold = true;
@@ -61,7 +67,8 @@ TEST_CASE("the report has the documented keys") {
     const auto report = make_report(run.content);
     CHECK(keys(report) == Names{"program", "version", "ends_by", "output", "object", "hint",
                                 "record_format", "datagrams", "ellipsoids", "vertices", "records",
-                                "others", "mesh", "not_inserted", "quality", "seconds"});
+                                "others", "mesh", "confidence", "not_inserted", "quality",
+                                "seconds"});
     CHECK(keys(report["object"]) == Names{"id", "name", "unit", "complete", "id_verified"});
     CHECK(keys(report["record_format"]) == Names{"normal_bits", "ring", "colour"});
     CHECK(keys(report["datagrams"]) == Names{"received", "lost", "duplicate", "reordered",
@@ -71,6 +78,11 @@ TEST_CASE("the report has the documented keys") {
     CHECK(keys(report["vertices"]) == Names{"received", "expected", "in_mesh"});
     CHECK(keys(report["mesh"]) == Names{"vertices", "faces", "components", "genus", "closed",
                                         "manifold", "topology_as_promised", "judged", "isolevel"});
+    CHECK(keys(report["confidence"]) ==
+          Names{"missing", "received", "concealed", "coarse", "largest_gap", "farther", "octants"});
+    CHECK(keys(report["confidence"]["largest_gap"]) == Names{"center", "radius"});
+    CHECK(keys(report["confidence"]["farther"][0]) == Names{"distance", "share"});
+    CHECK(keys(report["confidence"]["octants"][0]) == Names{"received", "expected"});
     CHECK(keys(report["quality"]) ==
           Names{"rms", "mean", "max", "rms_to_reference", "rms_from_reference", "normal_deg"});
     CHECK(report["datagrams"]["malformed_by"].size() ==
@@ -95,6 +107,17 @@ TEST_CASE("the report says what happened") {
     CHECK(report["vertices"]["in_mesh"] == 3);
     CHECK(report["not_inserted"] == std::vector<int>{7});
     CHECK(report["mesh"]["genus"] == 4);
+    const auto& confidence = report["confidence"];
+    CHECK(confidence["missing"] == 6);
+    CHECK(confidence["received"] == 3);
+    CHECK(confidence["concealed"] == 1);
+    CHECK(confidence["coarse"] == 0);
+    CHECK(confidence["largest_gap"]["center"] == std::vector<double>{1, 2, 0.5});
+    CHECK(confidence["largest_gap"]["radius"] == 0.25);
+    CHECK(confidence["farther"][1]["share"] == 0.375);
+    CHECK(confidence["octants"].size() == 8);
+    CHECK(confidence["octants"][5]["received"] == 3);
+    CHECK(confidence["octants"][5]["expected"] == 7.5);
     CHECK(report["quality"]["rms"] == 0.5);
     CHECK(report["seconds"]["insert"]["wall"] == 0.5);
     CHECK(report["seconds"]["insert"]["cpu"] == 0.75);
@@ -106,6 +129,7 @@ TEST_CASE("a report of nothing keeps its keys, but says null") {
     CHECK(report["hint"].is_null());
     CHECK(report["record_format"].is_null());
     CHECK(report["mesh"].is_null());
+    CHECK(report["confidence"].is_null());
     CHECK(report["output"].is_null());
     CHECK(report["vertices"]["received"] == 0);
     CHECK_FALSE(report.contains("quality"));
@@ -130,6 +154,10 @@ TEST_CASE("the summary for people names loss, topology and distance") {
     CHECK(text.find("9 lost (32.1 %)") != std::string::npos);
     CHECK(text.find("NOT as promised") != std::string::npos);
     CHECK(text.find("rms 5.00e-01") != std::string::npos);
+    CHECK(text.find("6 vertices missing, 1 guessed; largest gap: radius 0.25 at (1, 2, 0.5); "
+                    "37.5 % of the surface farther than 0.125 from") != std::string::npos);
+    run.reconstruction.summary.missing = 0;
+    CHECK(summary_text(run.content).find("missing") == std::string::npos);
     run.reconstruction.judged = false;
     CHECK(summary_text(run.content).find("not judged") != std::string::npos);
 }

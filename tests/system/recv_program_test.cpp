@@ -143,7 +143,8 @@ TEST_CASE("help and version end well and say what is asked") {
     const Outcome help = run({"--help"});
     CHECK(help.code == 0);
     CHECK(holds(help.out, "Examples:"));
-    for (const char* option : {"--listen", "--until", "--idle-timeout", "--drop", "--config"}) {
+    for (const char* option : {"--listen", "--until", "--idle-timeout", "--conceal", "--drop",
+                               "--config"}) {
         CHECK(holds(help.out, option));
     }
     const Outcome version = run({"--version"});
@@ -169,6 +170,7 @@ TEST_CASE("what the user got wrong is said in one line that names it, and exits 
         {{"--listen", "192.0.2.1:5004"}, "192.0.2.1:5004"},
         {{"--grid", "2"}, "--grid"},
         {{"--until", "tomorrow"}, "--until"},
+        {{"--conceal", "maybe"}, "--conceal"},
         {{"--idle-timeout", "-1"}, "--idle-timeout"},
         {{"--idle-timeout", "nan"}, "--idle-timeout"},
         {{"--drop", "1.5"}, "--drop"},
@@ -280,6 +282,27 @@ TEST_CASE("a whole object arrives, bit for bit, and the report says so") {
     }
     CHECK(holds(receiver.process->out(), "1500 of 1500 vertices"));
     CHECK(holds(receiver.process->out(), "distance to the reference"));
+}
+
+TEST_CASE("missing vertices are guessed and marked, unless that is off") {
+    const bool off = GENERATE(false, true);
+    Arguments arguments{"--drop-vertices", "0.5"};
+    if (off) arguments.insert(arguments.end(), {"--conceal", "off"});
+    Receiver receiver(arguments);
+    Sender(receiver.port()).send(made_datagrams(sphere()));
+    REQUIRE(receiver.process->wait() == 0);
+    const auto report = receiver.report();
+    CAPTURE(report.dump(1));
+    CHECK(report["confidence"]["missing"].get<int>() > 0);
+    CHECK((report["confidence"]["concealed"] > 0) == !off);
+    CHECK(report["confidence"]["received"] == report["vertices"]["in_mesh"]);
+    CHECK(report["confidence"]["largest_gap"]["radius"] > 0);
+    CHECK(holds(receiver.process->out(), "vertices missing"));
+    CHECK(holds(receiver.process->out(), "guessed") == !off);
+    const std::string header = tests::read_file(receiver.output).substr(0, 600);
+    CHECK(holds(header, "property uchar provenance"));
+    CHECK(holds(header, "property float distance_to_received"));
+    CHECK(holds(header, "property float confidence"));
 }
 
 TEST_CASE("a signal keeps what was received") {
