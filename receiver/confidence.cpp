@@ -79,7 +79,7 @@ std::vector<double> vertex_areas(const TriangleMesh& mesh) {
     return areas;
 }
 
-// Which cells touch: those of cell k from first[k] to first[k + 1].
+// Which cells touch: those of cell k from first[k] to first[k + 1], some more than once.
 struct CellNeighbours {
     std::vector<std::size_t> first;
     std::vector<std::uint32_t> cells;
@@ -89,26 +89,30 @@ struct CellNeighbours {
     }
 };
 
-CellNeighbours touching_cells(const TriangleMesh& mesh, const std::vector<std::uint32_t>& cell,
-                              std::size_t count) {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+// Calls visit(a, b) for every side of a triangle that leads from cell a to another cell b. In a
+// closed mesh the triangle beyond has the same side the other way round.
+template <class Visit>
+void for_each_crossing(const TriangleMesh& mesh, const std::vector<std::uint32_t>& cell,
+                       const Visit& visit) {
     for (const Triangle& t : mesh.triangles) {
         for (std::size_t c = 0; c < 3; ++c) {
             const std::uint32_t a = cell[t[c]];
             const std::uint32_t b = cell[t[(c + 1) % 3]];
-            // In a closed mesh the triangle beyond has the same side the other way round.
-            if (a != b && a != kNoCell && b != kNoCell) pairs.emplace_back(a, b);
+            if (a != b && a != kNoCell && b != kNoCell) visit(a, b);
         }
     }
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+}
+
+CellNeighbours touching_cells(const TriangleMesh& mesh, const std::vector<std::uint32_t>& cell,
+                              std::size_t count) {
     CellNeighbours result;
     result.first.assign(count + 1, 0);
-    for (const auto& [a, b] : pairs) {
-        ++result.first[a + 1];
-        result.cells.push_back(b);
-    }
-    for (std::size_t k = 0; k < count; ++k) result.first[k + 1] += result.first[k];
+    for_each_crossing(mesh, cell, [&](std::uint32_t a, std::uint32_t) { ++result.first[a + 1]; });
+    std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
+    result.cells.resize(result.first.back());
+    std::vector<std::size_t> next(result.first.begin(), result.first.end() - 1);
+    for_each_crossing(mesh, cell,
+                      [&](std::uint32_t a, std::uint32_t b) { result.cells[next[a]++] = b; });
     return result;
 }
 
@@ -123,20 +127,20 @@ std::vector<double> usual_areas(const std::vector<double>& areas, const CellNeig
                                 unsigned threads) {
     std::vector<double> usual(areas.size());
     common::parallel_for(areas.size(), threads, [&](std::size_t begin, std::size_t end) {
-        std::vector<std::uint32_t> around;
+        std::vector<std::uint32_t> asked_by(areas.size(), kNoCell);  // so that each counts once
         std::vector<double> values;
         for (std::size_t k = begin; k < end; ++k) {
             const auto cell = static_cast<std::uint32_t>(k);
-            around.assign({cell});
-            for (const std::uint32_t near : touching.of(cell)) {
-                around.push_back(near);
-                const auto next = touching.of(near);
-                around.insert(around.end(), next.begin(), next.end());
-            }
-            std::sort(around.begin(), around.end());
-            around.erase(std::unique(around.begin(), around.end()), around.end());
             values.clear();
-            for (const std::uint32_t other : around) values.push_back(areas[other]);
+            const auto add = [&](std::uint32_t other) {
+                if (asked_by[other] != cell) values.push_back(areas[other]);
+                asked_by[other] = cell;
+            };
+            add(cell);
+            for (const std::uint32_t near : touching.of(cell)) {
+                add(near);
+                for (const std::uint32_t beyond : touching.of(near)) add(beyond);
+            }
             usual[k] = lower_quartile(values);
         }
     });

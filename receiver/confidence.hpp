@@ -31,7 +31,9 @@ namespace ellicast::receiver {
 /// to itself), then divided. 1 everywhere when nothing is missing.
 ///
 /// An estimate: where the original itself changes from dense to sparse within a few vertices, the
-/// sparse side looks as if some were missing.
+/// sparse side looks as if some were missing; and a loss that changes only over many vertices looks
+/// like a sparser original, and counts as even. (Losses of datagrams are even: their records lie
+/// far apart.)
 struct Confidence {
     std::vector<float> distance;  // each with one value per vertex
     std::vector<float> completeness;

@@ -143,8 +143,8 @@ TEST_CASE("help and version end well and say what is asked") {
     const Outcome help = run({"--help"});
     CHECK(help.code == 0);
     CHECK(holds(help.out, "Examples:"));
-    for (const char* option : {"--listen", "--until", "--idle-timeout", "--conceal", "--drop",
-                               "--config"}) {
+    for (const char* option :
+         {"--listen", "--until", "--idle-timeout", "--conceal", "--drop", "--config"}) {
         CHECK(holds(help.out, option));
     }
     const Outcome version = run({"--version"});
