@@ -8,6 +8,7 @@
 
 #include "common/mesh_topology.hpp"
 #include "common/random.hpp"
+#include "common/vertex_normals.hpp"
 #include "receiver/surface_mesh.hpp"
 #include "receiver/vertex_removal.hpp"
 #include "tests/support/meshes.hpp"
@@ -24,7 +25,7 @@ constexpr double kOneLevel = 1e6;  // cell with which no edge is long
 
 std::vector<KnownVertex> estimated(const TriangleMesh& mesh, double doubt) {
     std::vector<KnownVertex> known;
-    for (const Vector3d& normal : vertex_normals(mesh)) known.push_back({normal, doubt});
+    for (const Vector3d& normal : common::vertex_normals(mesh)) known.push_back({normal, doubt});
     return known;
 }
 
@@ -260,12 +261,4 @@ TEST_CASE("threads change no bit of what is guessed") {
     const TriangleMesh many = concealed(mesh, 0.01, 0.03, 1.0, 7);
     CHECK(one.positions == many.positions);
     CHECK(one.triangles == many.triangles);
-}
-
-TEST_CASE("vertex normals are exact on a sphere, however uneven its triangles") {
-    const TriangleMesh mesh = thinned(tests::icosphere(3), 0.3, 1);
-    const std::vector<Vector3d> normals = vertex_normals(mesh);
-    for (std::size_t v = 0; v < normals.size(); ++v) {
-        REQUIRE((normals[v] - mesh.positions[v]).norm() < 1e-9);
-    }
 }
