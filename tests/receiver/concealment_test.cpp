@@ -33,7 +33,7 @@ std::vector<KnownVertex> estimated(const TriangleMesh& mesh, double doubt) {
 TriangleMesh concealed(const TriangleMesh& mesh, double doubt, double cell, double strength = 1.0,
                        unsigned threads = 1) {
     const common::TriangleTree guide(mesh);
-    return conceal(mesh, estimated(mesh, doubt), {&guide, cell}, strength, threads);
+    return conceal(mesh, estimated(mesh, doubt), {&guide, cell}, strength, threads).mesh;
 }
 
 TriangleMesh thinned(const TriangleMesh& mesh, double kept, std::uint64_t seed) {
@@ -120,14 +120,14 @@ TEST_CASE("a guide that was right at the ends is followed between them") {
     const common::TriangleTree sphere(tests::icosphere(5));
     std::vector<KnownVertex> known = estimated(mesh, 0.0);
     for (KnownVertex& vertex : known) vertex.normal.setZero();  // normals ask for nothing
-    const TriangleMesh result = conceal(mesh, known, {&sphere, kOneLevel}, 1.0, 1);
+    const TriangleMesh result = conceal(mesh, known, {&sphere, kOneLevel}, 1.0, 1).mesh;
     REQUIRE(result.positions.size() == mesh.positions.size() + edges_of(mesh));
     for (std::size_t v = mesh.positions.size(); v < result.positions.size(); ++v) {
         REQUIRE(result.positions[v].norm() == Approx(1.0).margin(0.01));  // the chords': 0.96
     }
     // One that was wrong there is not: then only the other diagonal speaks, and softly.
     for (KnownVertex& vertex : known) vertex.doubt = kNoTrust;
-    const TriangleMesh doubtful = conceal(mesh, known, {&sphere, kOneLevel}, 1.0, 1);
+    const TriangleMesh doubtful = conceal(mesh, known, {&sphere, kOneLevel}, 1.0, 1).mesh;
     for (std::size_t v = mesh.positions.size(); v < doubtful.positions.size(); ++v) {
         REQUIRE(doubtful.positions[v].norm() < 0.97);
     }
@@ -183,7 +183,7 @@ TEST_CASE("triangles are cut to fit whatever sides are split") {
                 tilted[v].normal = (tilted[v].normal + 0.4 * mesh.positions[v]).normalized();
             }
         }
-        const TriangleMesh result = conceal(mesh, tilted, {&guide, kOneLevel}, 1.0, 1);
+        const TriangleMesh result = conceal(mesh, tilted, {&guide, kOneLevel}, 1.0, 1).mesh;
         CHECK(result.positions.size() > mesh.positions.size() + 20);
         CHECK(result.positions.size() < mesh.positions.size() + edges_of(mesh) - 20);
         require_positions_kept(mesh, result);
@@ -220,11 +220,52 @@ TEST_CASE("only edges longer than two cells are split again, at most twice") {
     const TriangleMesh mesh = tests::icosphere(1);  // edges of 0.55 and 0.62
     const common::TriangleTree sphere(tests::icosphere(5));
     const auto size = [&](double cell) {
-        return conceal(mesh, estimated(mesh, 0.0), {&sphere, cell}, 1.0, 1).positions.size();
+        return conceal(mesh, estimated(mesh, 0.0), {&sphere, cell}, 1.0, 1).mesh.positions.size();
     };
     CHECK(size(1.0) == 162);     // icosphere(2)
     CHECK(size(0.12) == 642);    // halves of 0.28 and 0.31
     CHECK(size(0.001) == 2562);  // three levels and no more
+}
+
+TEST_CASE("guessed vertices know the edge that they split") {
+    const TriangleMesh mesh = tests::icosphere(1);
+    const common::TriangleTree guide(mesh);
+    const Concealed result = conceal(mesh, estimated(mesh, kNoTrust), {&guide, 0.1}, 1e-9, 1);
+    const auto& positions = result.mesh.positions;
+    REQUIRE(positions.size() == mesh.positions.size() + result.parents.size());
+    for (std::size_t k = 0; k < result.parents.size(); ++k) {
+        const std::size_t v = mesh.positions.size() + k;
+        const auto [a, b] = result.parents[k];
+        REQUIRE(a < v);
+        REQUIRE(b < v);
+        REQUIRE((positions[v] - 0.5 * (positions[a] + positions[b])).norm() < 1e-8);
+    }
+}
+
+TEST_CASE("guesses that make two near sheets intersect are taken back, and no others") {
+    // A plate whose normals ask both sides to bend inwards, further than it is thick.
+    const TriangleMesh mesh = tests::box({1, 1, 0.02}, 1);
+    std::vector<KnownVertex> known = estimated(mesh, kNoTrust);
+    for (std::size_t v = 0; v < known.size(); ++v) {
+        Vector3d& normal = known[v].normal;
+        const Vector3d& p = mesh.positions[v];
+        normal = Vector3d(-0.8 * p.x(), -0.8 * p.y(), p.z() > 0 ? 1 : -1).normalized();
+    }
+    const common::TriangleTree guide(mesh);
+    Concealed result = conceal(mesh, known, {&guide, kOneLevel}, 1.0, 1);
+    const TriangleMesh before = result.mesh;
+    REQUIRE(common::count_self_intersections(before, 1).faces > 0);
+    Concealed other = result;
+    CHECK(flatten_intersections(result, 1) == 0);
+    CHECK(common::count_self_intersections(result.mesh, 1).faces == 0);
+    CHECK(result.mesh.triangles == before.triangles);
+    require_positions_kept(mesh, result.mesh);
+    flatten_intersections(other, 5);
+    CHECK(other.mesh.positions == result.mesh.positions);
+    // Nothing to do: nothing changes.
+    const std::vector<Vector3d> settled = result.mesh.positions;
+    CHECK(flatten_intersections(result, 1) == 0);
+    CHECK(result.mesh.positions == settled);
 }
 
 TEST_CASE("zero-area faces and coincident points give no number that is none") {
