@@ -76,7 +76,8 @@ TEST_CASE("float32 positions survive bit for bit, wherever the model lies") {
 }
 
 TEST_CASE("an origin is taken only where the box lies more than three half extents away") {
-    const double offset = GENERATE(0.0, 2.8, 2.99, 3.01, 100.0, -2.99, -3.01);
+    // Not float32, for which none is needed.
+    const double offset = GENERATE(0.0, 2.8, 2.99, 3.01, 100.1, -2.99, -3.01);
     std::vector<Eigen::Vector3d> points;
     for (const double x : {-1.0, 1.0}) {
         for (const double y : {-1.0, 1.0}) {
