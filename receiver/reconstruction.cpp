@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "common/coarse_surface.hpp"
 #include "common/ellipsoid.hpp"
@@ -167,11 +168,17 @@ class Pipeline {
         shift_to_points(surface_, points_);
         stage("flip");
         flip_all_to_delaunay(surface_.mesh);
+        smooth({});
+    }
+
+    // Rings that are `settled` stay.
+    void smooth(std::span<const char> settled) {
         const common::DiagonalWeights weights =
             common::diagonal_weights(object_.hint.diagonals, has_normals(), loss());
-        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle}});
+        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle}, .settled = settled});
         const std::vector<Vector3d> normals = guiding_normals();
-        flip_to_smooth(surface_.mesh, {.normals = normals, .weights = weights});
+        flip_to_smooth(surface_.mesh,
+                       {.normals = normals, .weights = weights, .settled = settled});
     }
 
     // Of vertices; the one loss that geometry knows of (DESIGN section 1).
@@ -191,8 +198,7 @@ class Pipeline {
             witnesses[v] = {common::ring_hash(object_.vertex_index[point]),
                             static_cast<std::uint8_t>(object_.vertices[point].ring), true};
         }
-        const bool lossy = points_.size() < object_.hint.vertices;
-        if (lossy) return mend_lossy(witnesses);
+        if (points_.size() < object_.hint.vertices) return mend_lossy(witnesses);
         SurfaceMesh other = surface_.mesh;
         flip_all_to_delaunay(other);
         if (ring_agreement(other, witnesses).agree > ring_agreement(surface_.mesh, witnesses).agree)
@@ -206,8 +212,12 @@ class Pipeline {
         }
     }
 
+    // Rings that agree stay; the rest is mended anew around them.
     void mend_lossy(const std::vector<RingWitness>& witnesses) {
-        rings_ = repair_rings(surface_.mesh, witnesses, true);
+        flip_all_to_delaunay(surface_.mesh);
+        repair_rings(surface_.mesh, witnesses, true);
+        smooth(settled_rings(surface_.mesh, witnesses));
+        rings_ = ring_agreement(surface_.mesh, witnesses);
     }
 
     [[nodiscard]] bool has_normals() const { return object_.hint.format.normal_bits != 0; }

@@ -16,23 +16,38 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Weights and temperatures of the annealing; a ring that disagrees costs 1. With vertices missing,
-// a ring may disagree rightly: the shape gets more of a say, the valence less.
-struct Annealing {
-    double valence;   // of a wrong ring, per neighbour too many or too few
-    double delaunay;  // per unit of negative cotangent sum of an edge
-    double crease;    // per unit of 1 - cosine of the angle between the faces of an edge
-    double hot, cold;
-    std::size_t steps;  // per wrong vertex, in the first round
-    int rounds;         // each of four times the steps of the one before
-};
-constexpr Annealing kWhole{0.3, 0.3, 0.5, 0.6, 0.12, 500, 3};
-constexpr Annealing kLossy{0.05, 0.6, 1.0, 0.4, 0.12, 300, 1};
+// Weights and temperatures of the annealing; a ring that disagrees costs 1.
+constexpr double kValence = 0.3;   // of a wrong ring, per neighbour too many or too few
+constexpr double kDelaunay = 0.3;  // per unit of negative cotangent sum of an edge
+constexpr double kCrease = 0.5;    // per unit of 1 - cosine of the angle between an edge's faces
+constexpr double kHot = 0.6;
+constexpr double kCold = 0.12;
+// Steps per wrong vertex in the first round; each further round has four times as many.
+constexpr std::size_t kSteps = 500;
+constexpr int kRounds = 3;
 // A cotangent sum further below zero says no more.
 constexpr double kWorstCotangent = 2.0;
-// Flips that gain this much are made at once: two more rings agree, or one where vertices miss.
+// With vertices missing, rings may disagree rightly. The valence says little then, and the shape,
+// what smoothing flips minimise per mean edge length, is asked about each flip. Annealing would
+// join wrong neighbours until rings agree by chance: rms of homer at 10 % loss, of the normal tags
+// alone 1.9, annealed 2.8, with sure flips 1.8 x 1e-4; of the rocker arm 1.8, 1.5 and 1.4.
+constexpr double kLossyValence = 0.05;
+constexpr double kLossyCrease = 2.0;
+constexpr double kFlat = 0.1;  // radians
+// Gains of flips that are made at once: two more rings agree, or one where vertices miss.
 constexpr double kSureGain = 2.0;
 constexpr double kSureLossyGain = 1.0;
+
+double mean_edge_length(const SurfaceMesh& mesh) {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (HalfedgeId h = 0; h < 3 * mesh.face_slots(); ++h) {
+        if (!mesh.face_alive(SurfaceMesh::face_of(h))) continue;
+        sum += (mesh.position(mesh.from_vertex(h)) - mesh.position(mesh.to_vertex(h))).norm();
+        ++count;
+    }
+    return sum > 0.0 ? sum / static_cast<double>(count) : 1.0;
+}
 
 class Repair {
   public:
@@ -40,7 +55,7 @@ class Repair {
         : mesh_(mesh),
           witnesses_(witnesses),
           lossy_(lossy),
-          how_(lossy ? kLossy : kWhole),
+          unit_(mean_edge_length(mesh)),
           syndromes_(mesh.vertex_slots()),
           listed_(mesh.vertex_slots(), 0) {
         for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {
@@ -50,8 +65,9 @@ class Repair {
 
     void run() {
         greedy();
-        std::size_t steps = how_.steps;
-        for (int round = 0; round < how_.rounds && agreement().disagree > 0; ++round, steps *= 4) {
+        if (lossy_) return;
+        std::size_t steps = kSteps;
+        for (int round = 0; round < kRounds && agreement().disagree > 0; ++round, steps *= 4) {
             anneal_all(steps, static_cast<std::uint64_t>(round));
         }
     }
@@ -61,6 +77,17 @@ class Repair {
         for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {
             if (!mesh_.vertex_alive(v) || !witnesses_[v].judged) continue;
             ++(wrong(v) ? result.disagree : result.agree);
+        }
+        return result;
+    }
+
+    [[nodiscard]] std::vector<char> settled() const {
+        std::vector<char> result(mesh_.vertex_slots(), 0);
+        for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {
+            if (!mesh_.vertex_alive(v) || !agrees(v)) continue;
+            mesh_.for_each_outgoing(v, [&](HalfedgeId h) {
+                if (agrees(mesh_.to_vertex(h))) result[v] = 1;
+            });
         }
         return result;
     }
@@ -88,10 +115,12 @@ class Repair {
         return witnesses_[v].judged && (syndromes_[v].valence != 0 || syndromes_[v].sum != 0);
     }
 
+    bool agrees(VertexId v) const { return witnesses_[v].judged && !wrong(v); }
+
     double cost(const Syndrome& s) const {
         if (s.valence == 0 && s.sum == 0) return 0.0;
         const int d = s.valence < 4 ? s.valence : 8 - s.valence;
-        return 1.0 + how_.valence * std::min(d, 4);
+        return 1.0 + (lossy_ ? kLossyValence : kValence) * std::min(d, 4);
     }
     Syndrome gained(VertexId v, VertexId other) const {
         return {static_cast<std::uint8_t>((syndromes_[v].valence + 1) % 8),
@@ -124,10 +153,12 @@ class Repair {
         const Vector3d ns = (p - q).cross(s - q);
         const double ar = nr.norm();
         const double as = ns.norm();
-        if (!(ar > 0.0) || !(as > 0.0)) return kWorstCotangent * how_.delaunay + 2.0 * how_.crease;
+        if (!(ar > 0.0) || !(as > 0.0)) return kWorstCotangent * kDelaunay + 2.0 * kCrease;
         const double cot = (p - r).dot(q - r) / ar + (p - s).dot(q - s) / as;
-        return how_.delaunay * std::clamp(-cot, 0.0, kWorstCotangent) +
-               how_.crease * (1.0 - nr.dot(ns) / (ar * as));
+        const double delaunay = kDelaunay * std::clamp(-cot, 0.0, kWorstCotangent);
+        const double cosine = std::clamp(nr.dot(ns) / (ar * as), -1.0, 1.0);
+        if (!lossy_) return delaunay + kCrease * (1.0 - cosine);
+        return delaunay + kLossyCrease * (p - q).norm() / unit_ * (std::acos(cosine) + kFlat);
     }
 
     double shape_change(HalfedgeId h) const {
@@ -231,8 +262,8 @@ class Repair {
         double best = 0.0;
         for (std::size_t step = 0; step < budget && wrongs > 0; ++step) {
             const double temperature =
-                how_.hot * std::pow(how_.cold / how_.hot,
-                                    static_cast<double>(step) / static_cast<double>(budget));
+                kHot *
+                std::pow(kCold / kHot, static_cast<double>(step) / static_cast<double>(budget));
             const std::size_t k = random.below(cluster.size());
             const VertexId v = cluster[k];
             if (!wrong(v)) {
@@ -284,7 +315,7 @@ class Repair {
     SurfaceMesh& mesh_;
     std::span<const RingWitness> witnesses_;
     bool lossy_;
-    Annealing how_;
+    double unit_;  // mean edge length
     std::vector<Syndrome> syndromes_;
     std::vector<char> listed_;  // in the cluster that is being annealed
 };
@@ -294,6 +325,11 @@ class Repair {
 RingAgreement ring_agreement(const SurfaceMesh& mesh, std::span<const RingWitness> witnesses) {
     SurfaceMesh copy = mesh;
     return Repair(copy, witnesses, false).agreement();
+}
+
+std::vector<char> settled_rings(const SurfaceMesh& mesh, std::span<const RingWitness> witnesses) {
+    SurfaceMesh copy = mesh;
+    return Repair(copy, witnesses, false).settled();
 }
 
 RingAgreement repair_rings(SurfaceMesh& mesh, std::span<const RingWitness> witnesses, bool lossy) {
