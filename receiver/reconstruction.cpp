@@ -177,8 +177,7 @@ class Pipeline {
             common::diagonal_weights(object_.hint.diagonals, has_normals(), loss());
         flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle}, .settled = settled});
         const std::vector<Vector3d> normals = guiding_normals();
-        flip_to_smooth(surface_.mesh,
-                       {.normals = normals, .weights = weights, .settled = settled});
+        flip_to_smooth(surface_.mesh, {.normals = normals, .weights = weights, .settled = settled});
     }
 
     // Of vertices; the one loss that geometry knows of (DESIGN section 1).
