@@ -83,6 +83,10 @@ double smoothing_gain(const SurfaceMesh& mesh, HalfedgeId h, double unit,
                       const FlipCriterion& criterion) {
     const HalfedgeId t = mesh.twin(h);
     const Corners q = corners_of(mesh, h);
+    const auto settled = [&](VertexId v) { return criterion.settled[v] != 0; };
+    if (!criterion.settled.empty() && std::any_of(q.id.begin(), q.id.end(), settled)) {
+        return -std::numeric_limits<double>::infinity();
+    }
     const double thin_now =
         std::min(triangle_quality(q.a, q.b, q.c), triangle_quality(q.b, q.a, q.d));
     const double thin_new =

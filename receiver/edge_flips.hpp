@@ -24,6 +24,8 @@ std::size_t flip_all_to_delaunay(SurfaceMesh& mesh);
 struct FlipCriterion {
     std::span<const Eigen::Vector3d> normals = {};  // unit, per vertex slot; or none at all
     common::DiagonalWeights weights = {};
+    /// Per vertex slot: not 0 where the ring must stay as it is. Empty: nowhere.
+    std::span<const char> settled = {};
 };
 
 /// Flips that lower the sum over all edges of length x (dihedral angle + 0.1 rad): few and gentle

@@ -5,16 +5,19 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "common/coarse_surface.hpp"
 #include "common/ellipsoid.hpp"
 #include "common/octahedral_normal.hpp"
 #include "common/parallel.hpp"
+#include "common/ring_tag.hpp"
 #include "common/triangle_tree.hpp"
 #include "common/vertex_normals.hpp"
 #include "receiver/concealment.hpp"
 #include "receiver/edge_flips.hpp"
 #include "receiver/ellipsoid_mesh.hpp"
+#include "receiver/ring_repair.hpp"
 #include "receiver/shrink_wrap.hpp"
 #include "receiver/surface_distance.hpp"
 #include "receiver/surface_mesh.hpp"
@@ -76,6 +79,7 @@ class Pipeline {
             unwrapped_ = coarse_->mesh;
             shrink_wrap(coarse_->mesh, points_, kWrapRounds, options_.threads);
             insert();
+            mend_rings();
         }
         return finish();
     }
@@ -164,11 +168,16 @@ class Pipeline {
         shift_to_points(surface_, points_);
         stage("flip");
         flip_all_to_delaunay(surface_.mesh);
+        smooth({});
+    }
+
+    // Rings that are `settled` stay.
+    void smooth(std::span<const char> settled) {
         const common::DiagonalWeights weights =
             common::diagonal_weights(object_.hint.diagonals, has_normals(), loss());
-        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle}});
+        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle}, .settled = settled});
         const std::vector<Vector3d> normals = guiding_normals();
-        flip_to_smooth(surface_.mesh, {.normals = normals, .weights = weights});
+        flip_to_smooth(surface_.mesh, {.normals = normals, .weights = weights, .settled = settled});
     }
 
     // Of vertices; the one loss that geometry knows of (DESIGN section 1).
@@ -176,6 +185,40 @@ class Pipeline {
         return 1.0 -
                static_cast<double>(points_.size()) / static_cast<double>(object_.hint.vertices);
     }
+
+    // Ring tags know better than any shape criterion which edges there were.
+    void mend_rings() {
+        if (!object_.hint.format.ring) return;
+        stage("rings");
+        std::vector<RingWitness> witnesses(surface_.mesh.vertex_slots());
+        for (VertexId v = 0; v < witnesses.size(); ++v) {
+            const std::uint32_t point = surface_.point_of_vertex[v];
+            if (point == kNone) continue;
+            witnesses[v] = {common::ring_hash(object_.vertex_index[point]),
+                            static_cast<std::uint8_t>(object_.vertices[point].ring), true};
+        }
+        if (points_.size() < object_.hint.vertices) return mend_lossy(witnesses);
+        SurfaceMesh other = surface_.mesh;
+        flip_all_to_delaunay(other);
+        if (ring_agreement(other, witnesses).agree > ring_agreement(surface_.mesh, witnesses).agree)
+            std::swap(other, surface_.mesh);
+        rings_ = repair_rings(surface_.mesh, witnesses);
+        if (rings_->disagree == 0) return;
+        const RingAgreement others = repair_rings(other, witnesses);
+        if (others.disagree < rings_->disagree) {
+            rings_ = others;
+            surface_.mesh = std::move(other);
+        }
+    }
+
+    // Rings that agree stay; the rest is mended anew around them.
+    void mend_lossy(const std::vector<RingWitness>& witnesses) {
+        flip_all_to_delaunay(surface_.mesh);
+        repair_rings(surface_.mesh, witnesses, true);
+        smooth(settled_rings(surface_.mesh, witnesses));
+        rings_ = ring_agreement(surface_.mesh, witnesses);
+    }
+
     [[nodiscard]] bool has_normals() const { return object_.hint.format.normal_bits != 0; }
 
     // Of the vertex that stands for `point`: its tag, turned towards the surface's own `estimate`
@@ -300,6 +343,7 @@ class Pipeline {
         for (const std::uint32_t point : left_out_) {
             result.not_inserted.push_back(object_.vertex_index[point]);
         }
+        result.rings = rings_;
         result.topology = common::analyse_topology(result.mesh);
         result.topology_as_promised = as_promised(result.topology);
         result.judged = !object_.hint.approximate;
@@ -349,6 +393,7 @@ class Pipeline {
     common::TriangleMesh unwrapped_;
     PointSurface surface_;
     std::vector<std::uint32_t> left_out_;
+    std::optional<RingAgreement> rings_;
     Stages stages_;
 };
 

@@ -12,6 +12,7 @@
 #include "common/triangle_mesh.hpp"
 #include "receiver/confidence.hpp"
 #include "receiver/received_object.hpp"
+#include "receiver/ring_repair.hpp"
 
 namespace ellicast::receiver {
 
@@ -50,6 +51,7 @@ struct Reconstruction {
         false;           // components, Euler characteristic in all and of the largest
     bool judged = true;  // false when the sender promised only approximately
     float isolevel = 0;  // model units; with vertices, what was added to the local one
+    std::optional<RingAgreement> rings;  // of received vertices in the mesh; with ring tags
     std::optional<Stages> stages;
 };
 

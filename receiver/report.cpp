@@ -138,6 +138,10 @@ void add_mesh(const ReportContent& content, Json& report) {
                       {"judged", reconstruction.judged},
                       {"isolevel", reconstruction.isolevel}};
     report["confidence"] = confidence_json(reconstruction);
+    if (reconstruction.rings) {
+        report["mesh"]["rings"] = {{"agree", reconstruction.rings->agree},
+                                   {"disagree", reconstruction.rings->disagree}};
+    }
     report["not_inserted"] = reconstruction.not_inserted;
 }
 

@@ -50,6 +50,8 @@ struct ReportContent {
 ///   others        {groups, datagrams, contradictory_hints, evicted, over_limit}: strangers
 ///   mesh          {vertices, faces, components, genus, closed, manifold, topology_as_promised,
 ///                   judged, isolevel}, or null; judged is false for an approximate promise
+///                 {rings: {agree, disagree}}: with ring tags, received vertices whose neighbours
+///                   are, or are not, those of the original
 ///   confidence    {missing, received, concealed, coarse, largest_gap, farther, octants}, or null
 ///                 missing: vertices that did not arrive; received, concealed, coarse: vertices of
 ///                   the mesh by Provenance; largest_gap: {center, radius}, null when none is

@@ -89,6 +89,14 @@ TEST_CASE("the report has the documented keys") {
           static_cast<std::size_t>(protocol::WireError::kCount));
 }
 
+TEST_CASE("the report counts rings where there are ring tags") {
+    Run run;
+    run.reconstruction.rings = RingAgreement{40, 2};
+    const auto rings = make_report(run.content)["mesh"]["rings"];
+    CHECK(rings["agree"] == 40);
+    CHECK(rings["disagree"] == 2);
+}
+
 TEST_CASE("the report says what happened") {
     Run run;
     run.object.hint.format = {.normal_bits = 12, .ring = true};
