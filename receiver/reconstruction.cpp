@@ -116,9 +116,10 @@ class Pipeline {
         const Vector3d lo(hint.box_min[0], hint.box_min[1], hint.box_min[2]);
         const Vector3d hi(hint.box_max[0], hint.box_max[1], hint.box_max[2]);
         const common::PromisedTopology promise{hint.components, hint.euler_all, hint.euler_largest};
+        const std::vector<Vector3d> normals = tagged_normals();
         coarse_ = common::make_coarse_surface(
-            ellipsoids, points_, Eigen::AlignedBox3d(frame_.to_unit(lo), frame_.to_unit(hi)),
-            promise, options_.grid, options_.threads);
+            {ellipsoids, points_, normals, {frame_.to_unit(lo), frame_.to_unit(hi)}}, promise,
+            options_.grid, options_.threads);
         if (coarse_ && options_.keep_stages) {
             stages_.ellipsoids = to_model_frame(mesh_of(ellipsoids));
             stages_.marching_cubes = to_model_frame(coarse_->mesh);
@@ -220,6 +221,17 @@ class Pipeline {
     }
 
     [[nodiscard]] bool has_normals() const { return object_.hint.format.normal_bits != 0; }
+
+    // One a point; none without tags.
+    [[nodiscard]] std::vector<Vector3d> tagged_normals() const {
+        std::vector<Vector3d> normals;
+        if (!has_normals()) return normals;
+        normals.reserve(object_.vertices.size());
+        for (const auto& v : object_.vertices) {
+            normals.push_back(common::decode_normal(v.normal, object_.hint.format.normal_bits));
+        }
+        return normals;
+    }
 
     // Of the vertex that stands for `point`: its tag, turned towards the surface's own `estimate`
     // by at most `doubt` radians; the estimate itself where there is no tag.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/coarse_surface.hpp"
+#include "common/octahedral_normal.hpp"
 #include "common/parallel.hpp"
 #include "common/random.hpp"
 
@@ -85,6 +86,9 @@ class Receivers {
         }
         for (const auto& record : plan.object().vertices) {
             points_.push_back(vector_of(record.position));
+            if (const int bits = hint.format.normal_bits; bits != 0) {
+                normals_.push_back(common::decode_normal(record.normal, bits));
+            }
         }
     }
 
@@ -99,8 +103,11 @@ class Receivers {
         }
         const std::vector<common::Ellipsoid> ellipsoids = those(ellipsoids_, with_ellipsoid);
         if (ellipsoids.empty()) return false;
-        const auto surface = common::make_coarse_surface(ellipsoids, those(points_, with_point),
-                                                         box_, promise_, cells_, 1);
+        const std::vector<Eigen::Vector3d> points = those(points_, with_point);
+        const std::vector<Eigen::Vector3d> normals =
+            normals_.empty() ? normals_ : those(normals_, with_point);
+        const auto surface =
+            common::make_coarse_surface({ellipsoids, points, normals, box_}, promise_, cells_, 1);
         return surface && surface->as_promised;
     }
 
@@ -121,6 +128,7 @@ class Receivers {
     common::PromisedTopology promise_;
     std::vector<common::Ellipsoid> ellipsoids_;
     std::vector<Eigen::Vector3d> points_;
+    std::vector<Eigen::Vector3d> normals_;  // one a point, or none
 };
 
 bool reaches(const LossTrial& trial, const CertificateGoal& goal) {

@@ -78,7 +78,7 @@ int right_topology(const std::vector<Ellipsoid>& ellipsoids, const TriangleMesh&
             if (!random.chance(loss)) received.push_back(e);
         }
         const auto surface = common::make_coarse_surface(
-            received, {}, box, sphere_with_handles(genus), kReceiverCells, 0);
+            {received, {}, {}, box}, sphere_with_handles(genus), kReceiverCells, 0);
         right += surface && surface->as_promised ? 1 : 0;
     }
     return right;
@@ -160,7 +160,7 @@ void check_coarse_surface(const std::string& name, std::int64_t genus,
         DecompositionOptions options;
         options.ellipsoids = counts[i];
         const auto surface = common::make_coarse_surface(
-            decompose(*model, options).ellipsoids, {}, common::bounding_box(model->positions),
+            {decompose(*model, options).ellipsoids, {}, {}, common::bounding_box(model->positions)},
             sphere_with_handles(genus), kReceiverCells, 0);
         REQUIRE(surface);
         const double overlap = common::volume_overlap(surface->mesh, *model);

@@ -30,7 +30,7 @@ std::vector<Ellipsoid> grown_in(const TriangleMesh& solid, std::size_t count) {
 double overlap(const std::vector<Ellipsoid>& ellipsoids, const TriangleMesh& solid,
                const common::PromisedTopology& promise) {
     const auto surface = common::make_coarse_surface(
-        ellipsoids, {}, common::bounding_box(solid.positions), promise, 96, 0);
+        {ellipsoids, {}, {}, common::bounding_box(solid.positions)}, promise, 96, 0);
     REQUIRE(surface);
     CHECK(surface->as_promised);
     return common::volume_overlap(surface->mesh, solid, 128);

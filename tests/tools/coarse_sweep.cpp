@@ -75,7 +75,7 @@ void run(const Options& o) {
             t0 = cpu();
             if (o.refine.rounds > 0) chosen = sender::refine_ellipsoids(chosen, solid, o.refine);
             const double refine = cpu() - t0;
-            const auto all = common::make_coarse_surface(chosen, {}, box, promised, 96, 2);
+            const auto all = common::make_coarse_surface({chosen, {}, {}, box}, promised, 96, 2);
             std::printf("%-15s %4zu grow %.2f sel %.2f ref %.2f  IoU %.4f lvl %.2f %s",
                         path.stem().c_str(), chosen.size(), grow, select, refine,
                         all ? common::volume_overlap(all->mesh, solid) : 0.0,
@@ -104,7 +104,7 @@ void run(const Options& o) {
                     for (const auto& e : chosen) {
                         if (!random.chance(loss)) left.push_back(e);
                     }
-                    const auto m = common::make_coarse_surface(left, {}, box, promised, 96, 2);
+                    const auto m = common::make_coarse_surface({left, {}, {}, box}, promised, 96, 2);
                     right += m && m->as_promised;
                     if (s < 2 && m) overlap += common::volume_overlap(m->mesh, solid, 128) / 2;
                 }
