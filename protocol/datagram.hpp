@@ -106,6 +106,7 @@ struct Hint {
     std::uint32_t vertices = 0;      // distinct records in the object
     RecordFormat format;
     std::uint8_t diagonals = 0;  // below kDiagonalRules: how the mesh was triangulated
+    bool by_importance = false;  // the vertices' order; else any that is spread evenly
     bool approximate = false;  // the promise is not to be judged (overlapping parts, inner shells)
     bool operator==(const Hint&) const = default;
 };

@@ -51,7 +51,8 @@ Hint read_hint(ByteReader& reader) {
     hint.vertices = reader.u32();
     const std::uint8_t format = reader.u8();
     hint.format = RecordFormat::of_code(format & 15);
-    hint.diagonals = format >> 4;
+    hint.diagonals = format >> 4 & 7;
+    hint.by_importance = (format & 0x80) != 0;
     return hint;
 }
 

@@ -30,7 +30,8 @@ void write_hint(ByteWriter& writer, const Hint& hint) {
     writer.i32(hint.euler_largest);
     writer.u16(hint.ellipsoids);
     writer.u32(hint.vertices);
-    writer.u8(static_cast<std::uint8_t>(hint.format.code() | hint.diagonals << 4));
+    writer.u8(static_cast<std::uint8_t>(hint.format.code() | hint.diagonals << 4 |
+                                        (hint.by_importance ? 0x80 : 0)));
 }
 
 void write_header(ByteWriter& writer, const DatagramHeader& header) {

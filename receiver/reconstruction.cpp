@@ -306,6 +306,17 @@ class Pipeline {
         return result;
     }
 
+    // Full from a third of the vertices lost. Those that only the end of an order by importance
+    // would bring are missed less. Prefix of half the vertices, rms with and without this, in 1e-4:
+    // spot 3.4 4.9, rocker-arm 1.8 2.2, bunny 1.7 2.0.
+    [[nodiscard]] double concealment_strength() const {
+        if (!object_.hint.by_importance) return std::min(1.0, kStrengthPerLoss * loss());
+        const double span = 1.0 + object_.vertex_index.back();
+        const double lost = 1.0 - static_cast<double>(points_.size()) / span;
+        const double to_come = 1.0 - span / static_cast<double>(object_.hint.vertices);
+        return std::min(1.0, std::max(kStrengthPerLoss * lost, to_come * to_come));
+    }
+
     // DESIGN section 7, in full from a third of the vertices lost.
     void conceal_missing(Extracted& extracted) const {
         if (!options_.conceal || points_.empty()) return;
@@ -326,7 +337,7 @@ class Pipeline {
                 }
             });
         Concealed concealed = conceal(extracted.mesh, std::move(known), {&wrapped, coarse_->cell},
-                                      std::min(1.0, kStrengthPerLoss * loss()), options_.threads);
+                                      concealment_strength(), options_.threads);
         flatten_intersections(concealed, options_.threads);
         extracted.mesh = std::move(concealed.mesh);
         extracted.point.resize(extracted.mesh.positions.size(), kNone);

@@ -213,6 +213,7 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     object.hint.format = record_format(options.tags, model);
     set_tags(object.hint.format, model, records, object.vertices);
     static_assert(common::kDiagonalRules == protocol::kDiagonalRules);
+    object.hint.by_importance = options.order == SendingOrder::importance;
     object.hint.diagonals = best_diagonal_rule(model.solid, object.hint.format.normal_bits);
 
     object.hint.components = promise.components;

@@ -33,8 +33,7 @@ struct LoadedModel {
 /// path and the reason.
 LoadedModel load_model(const std::filesystem::path& path, const DecompositionOptions& options,
                        const std::optional<std::filesystem::path>& cache,
-                       const TagOptions& tags = {},
-                       SendingOrder order = SendingOrder::importance);
+                       const TagOptions& tags = {}, SendingOrder order = SendingOrder::importance);
 
 /// The same up to the decomposition, which is written to `output`. Throws common::ModelError.
 LoadedModel decompose_to_file(const std::filesystem::path& path,

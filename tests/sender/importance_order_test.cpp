@@ -210,9 +210,9 @@ TEST_CASE("either order sends each vertex of the model once, and no cap's centre
     }
     std::set<protocol::ObjectId> ids;
     for (const SendingOrder order : {SendingOrder::importance, SendingOrder::spread}) {
-        const BroadcastObject object = make_object(
-            model, ShapePromise{}, tests::balls_in(model.vertices, 5, 1),
-            {.name = "model", .seed = 1, .tags = {}, .order = order});
+        const BroadcastObject object =
+            make_object(model, ShapePromise{}, tests::balls_in(model.vertices, 5, 1),
+                        {.name = "model", .seed = 1, .tags = {}, .order = order});
         std::set<std::array<float, 3>> sent;
         for (const protocol::VertexRecord& record : object.vertices) {
             sent.insert(record.position);

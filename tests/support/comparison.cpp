@@ -200,8 +200,12 @@ std::vector<std::uint32_t> records_of_original(const SimulatedModel& model) {
 
 const std::vector<Variant>& variants() {
     const auto as_it_comes = [](receiver::ReconstructionOptions&) {};
+    const auto without_concealment = [](receiver::ReconstructionOptions& options) {
+        options.conceal = false;
+    };
     static const std::vector<Variant> all{
         {"ellicast", kPlain, as_it_comes},
+        {"ellicast-unconcealed", kPlain, without_concealment},
         {"ellicast-tags", {.normal_bits = 8, .ring = false, .colour = false}, as_it_comes},
         {"ellicast-ring", {.normal_bits = 8, .ring = true, .colour = false}, as_it_comes},
     };

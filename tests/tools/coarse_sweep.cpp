@@ -104,7 +104,8 @@ void run(const Options& o) {
                     for (const auto& e : chosen) {
                         if (!random.chance(loss)) left.push_back(e);
                     }
-                    const auto m = common::make_coarse_surface({left, {}, {}, box}, promised, 96, 2);
+                    const auto m =
+                        common::make_coarse_surface({left, {}, {}, box}, promised, 96, 2);
                     right += m && m->as_promised;
                     if (s < 2 && m) overlap += common::volume_overlap(m->mesh, solid, 128) / 2;
                 }
