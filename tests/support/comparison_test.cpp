@@ -83,9 +83,9 @@ TEST_CASE("tags cost bytes, and the variants have nothing else in another place"
     CHECK(tags.stream_bytes > plain.stream_bytes + 3'200);
     CHECK(tags.stream_bytes < plain.stream_bytes + 2 * 3'200);
     CHECK(tags.bytes > plain.bytes);
-    CHECK(ring().variants[1].object.vertices[5].position ==
+    CHECK(ring().variants[2].object.vertices[5].position ==
           ring().variants[0].object.vertices[5].position);
-    CHECK(ring().variants[1].object.hint.format.normal_bits == 8);
+    CHECK(ring().variants[2].object.hint.format.normal_bits == 8);
 }
 
 TEST_CASE("a prefix is the beginning of the stream") {
