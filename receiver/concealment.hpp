@@ -24,6 +24,12 @@ struct KnownVertex {
     double doubt = 0;        // distance from here to the coarse surface before it was wrapped
 };
 
+struct Concealed {
+    common::TriangleMesh mesh;
+    /// Of guessed vertex k, at position (known vertices) + k: the ends of the edge that it split.
+    std::vector<std::array<std::uint32_t, 2>> parents;
+};
+
 /// Guesses the vertices that are missing: splits edges at midpoints that bulge as the normals at
 /// their ends ask for (DESIGN section 7, "Concealment": the harmonic mean of what the two ends ask
 /// for, so that a crease stays a crease), as the other diagonal asks for, and as the coarse surface
@@ -31,11 +37,6 @@ struct KnownVertex {
 /// the mesh stay bit for bit and keep their places; guessed ones follow. Edges that would not bulge
 /// are not split; triangles are cut to fit: a closed manifold stays one, of the same topology.
 /// `strength` scales the bulge, 0 to 1. Cost: linear, and a search of the guide per edge.
-struct Concealed {
-    common::TriangleMesh mesh;
-    /// Of guessed vertex k, at position (known vertices) + k: the ends of the edge that it split.
-    std::vector<std::array<std::uint32_t, 2>> parents;
-};
 Concealed conceal(const common::TriangleMesh& mesh, std::vector<KnownVertex> vertices,
                   const ShapeGuide& guide, double strength, unsigned threads);
 
