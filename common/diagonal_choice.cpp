@@ -12,14 +12,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Weight of an edge's own length beside length x dihedral angle, in radians: where the surface is
-// flat within about this angle the shorter diagonal wins, as in most meshes that people make.
-constexpr double kLengthWeight = 0.1;
-
 // Of the height term, estimated normals and tags: logistic fits over six models at 10 to 50 % loss
 // gave twice as much, which harms where the surface has creases.
 constexpr double kRiseWeight = 9.0;
 constexpr double kTaggedRiseWeight = 18.0;
+
+// Of marks: about what a rule's own terms come to where it fails. More than that, and pairs of
+// marks that belong to different edges lead astray.
+constexpr double kMarkWeight = 1.0;
+constexpr double kMarkPerAngle = 1.2;
 
 // The rules, without loss. Scans are mostly Delaunay, meshes that were decimated are not.
 struct Rule {
@@ -49,10 +50,10 @@ double crease_gain(const Quad& q) {
     const double ad = (q.a - q.d).norm();
     const double db = (q.d - q.b).norm();
     const auto& outer = q.outer_normals;
-    const double now = (q.a - q.b).norm() * (kLengthWeight + angle_between(abc, bad)) +
+    const double now = (q.a - q.b).norm() * (kDiagonalLengthWeight + angle_between(abc, bad)) +
                        bc * angle_between(abc, outer[0]) + ca * angle_between(abc, outer[1]) +
                        ad * angle_between(bad, outer[2]) + db * angle_between(bad, outer[3]);
-    const double flipped = (q.c - q.d).norm() * (kLengthWeight + angle_between(cdb, dca)) +
+    const double flipped = (q.c - q.d).norm() * (kDiagonalLengthWeight + angle_between(cdb, dca)) +
                            bc * angle_between(cdb, outer[0]) + ca * angle_between(dca, outer[1]) +
                            ad * angle_between(dca, outer[2]) + db * angle_between(cdb, outer[3]);
     return now - flipped;
@@ -86,12 +87,19 @@ DiagonalGain diagonal_gain(const Quad& quad) {
     return {crease_gain(quad), angle_gain(quad), rise_gain(quad)};
 }
 
+double weighed_diagonal_gain(const Quad& quad, const DiagonalWeights& weights, double unit) {
+    const DiagonalGain gain{crease_gain(quad), weights.angle != 0.0 ? angle_gain(quad) : 0.0,
+                            weights.rise != 0.0 ? rise_gain(quad) : 0.0};
+    return gain.weighed(weights.angle, weights.rise, unit);
+}
+
 DiagonalWeights diagonal_weights(std::uint8_t rule, bool tagged, double loss) {
     assert(rule < kDiagonalRules);
     const Rule& r = kRules[rule];
     const double kept = std::pow(1.0 - loss, kVerticesAround);
     return {kept * r.angle,
-            (tagged ? kTaggedRiseWeight : kRiseWeight) * (1.0 + kept * (r.rise - 1.0))};
+            (tagged ? kTaggedRiseWeight : kRiseWeight) * (1.0 + kept * (r.rise - 1.0)),
+            tagged ? kept * (kMarkWeight + kMarkPerAngle * r.angle) : 0.0};
 }
 
 }  // namespace ellicast::common

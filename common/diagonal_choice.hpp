@@ -35,6 +35,10 @@ struct DiagonalGain {
 };
 DiagonalGain diagonal_gain(const Quad& quad);
 
+/// Weight of an edge's own length beside length x dihedral angle, in radians: where the surface is
+/// flat within about this angle the shorter diagonal wins, as in most meshes that people make.
+inline constexpr double kDiagonalLengthWeight = 0.1;
+
 /// A flip must gain this many mean edge lengths, or ties would flip back and forth.
 inline constexpr double kLeastDiagonalGain = 0.02;
 
@@ -45,6 +49,9 @@ inline constexpr std::uint8_t kDiagonalRules = 6;
 struct DiagonalWeights {
     double angle = 0;
     double rise = 0;
+    /// Mean edge lengths by which a diagonal between two vertices with marked tags is the better
+    /// one: there the rule fails, as the sender found.
+    double mark = 0;
 };
 
 /// Weights of a rule for a mesh that lacks a share `loss` of its vertices. What holds for the
@@ -52,5 +59,9 @@ struct DiagonalWeights {
 /// nearly one. `tagged`: the vertex normals are tags, not estimates. Requires rule <
 /// kDiagonalRules.
 DiagonalWeights diagonal_weights(std::uint8_t rule, bool tagged, double loss);
+
+/// The same as diagonal_gain(quad).weighed(weights.angle, weights.rise, unit), without the terms
+/// that weigh nothing.
+double weighed_diagonal_gain(const Quad& quad, const DiagonalWeights& weights, double unit);
 
 }  // namespace ellicast::common

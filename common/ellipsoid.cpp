@@ -81,13 +81,4 @@ EllipsoidDistance::EllipsoidDistance(const Ellipsoid& ellipsoid)
     assert(ellipsoid.L.diagonal().minCoeff() > 0.0);
 }
 
-double EllipsoidDistance::operator()(const Eigen::Vector3d& x) const {
-    const Eigen::Vector3d d = x - center_;
-    const Eigen::Vector3d Ad = A_ * d;
-    const double norm_Ad = Ad.norm();
-    const double s = std::sqrt(std::max(0.0, d.dot(Ad)));
-    if (!(norm_Ad > 0.0) || s == 0.0) return value_at_center_;
-    return s * (s - 1.0) / norm_Ad;
-}
-
 }  // namespace ellicast::common

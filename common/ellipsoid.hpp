@@ -42,12 +42,44 @@ class EllipsoidDistance {
     /// Requires a positive diagonal of L (asserted).
     explicit EllipsoidDistance(const Ellipsoid& ellipsoid);
 
-    double operator()(const Eigen::Vector3d& x) const;
+    /// Four points of a row along x.
+    class Row {
+      public:
+        Row(const EllipsoidDistance& distance, const Eigen::Array4d& x, double y, double z);
+
+        [[nodiscard]] bool all_outside() const { return (s2_ >= 1.0).all(); }
+        [[nodiscard]] Eigen::Array4d values() const;
+
+      private:
+        Eigen::Array4d s2_;   // s^2
+        Eigen::Array4d Ad2_;  // |A d|^2
+        double value_at_center_;
+    };
 
   private:
     Eigen::Vector3d center_;
     Eigen::Matrix3d A_;
     double value_at_center_;
 };
+
+inline EllipsoidDistance::Row::Row(const EllipsoidDistance& distance, const Eigen::Array4d& x,
+                                   double y, double z)
+    : value_at_center_(distance.value_at_center_) {
+    const Eigen::Matrix3d& A = distance.A_;
+    const Eigen::Array4d dx = x - distance.center_[0];
+    const double dy = y - distance.center_[1];
+    const double dz = z - distance.center_[2];
+    const Eigen::Array4d u = A(0, 0) * dx + A(0, 1) * dy + A(0, 2) * dz;
+    const Eigen::Array4d v = A(1, 0) * dx + A(1, 1) * dy + A(1, 2) * dz;
+    const Eigen::Array4d w = A(2, 0) * dx + (A(2, 1) * dy + A(2, 2) * dz);
+    s2_ = dx * u + dy * v + dz * w;
+    Ad2_ = u * u + v * v + w * w;
+}
+
+inline Eigen::Array4d EllipsoidDistance::Row::values() const {
+    const Eigen::Array4d s = s2_.max(0.0).sqrt();
+    const Eigen::Array4d Ad = Ad2_.sqrt();
+    return (Ad > 0.0 && s != 0.0).select(s * (s - 1.0) / Ad, value_at_center_);
+}
 
 }  // namespace ellicast::common

@@ -14,7 +14,6 @@ namespace {
 
 // A cube's corner c lies at (c & 1, c >> 1 & 1, c >> 2). Edge 4 a + s runs along axis a from the
 // corner whose other two coordinates are the bits of s (lower axis first).
-constexpr int kCorners = 8;
 constexpr int kEdges = 12;
 
 struct EdgeGeometry {
@@ -146,7 +145,12 @@ constexpr double kEdgeMargin = 0.05;
 class Extractor {
   public:
     Extractor(const GridFrame& frame, std::span<const float> values, float isolevel)
-        : frame_(frame), values_(values), isolevel_(isolevel), inside_(values.size()) {}
+        : frame_(frame),
+          values_(values),
+          isolevel_(isolevel),
+          inside_(values.size()),
+          spans_(static_cast<std::size_t>(frame.dims[1]) *
+                 static_cast<std::size_t>(frame.dims[2])) {}
 
     TriangleMesh run(unsigned threads) {
         const auto layers = static_cast<std::size_t>(frame_.dims[2]);
@@ -182,19 +186,40 @@ class Extractor {
     // Vertex numbers of the crossings on the three edges that leave a node in positive direction.
     using LayerIds = std::vector<std::array<std::uint32_t, 3>>;
 
+    // Inside nodes of a row lie from `first` to before `last`; none where these are equal.
+    struct Span {
+        int first = 0;
+        int last = 0;
+    };
+
     void classify(std::size_t k_begin, std::size_t k_end) {
         const auto [nx, ny, nz] = frame_.dims;
-        for (std::size_t layer = k_begin; layer < k_end; ++layer) {
-            const int k = static_cast<int>(layer);
-            for (int j = 0; j < ny; ++j) {
-                for (int i = 0; i < nx; ++i) {
-                    const bool border =
-                        i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1;
-                    const std::size_t n = frame_.index(i, j, k);
-                    inside_[n] = !border && values_[n] < isolevel_;
-                }
-            }
+        for (int k = static_cast<int>(k_begin); k < static_cast<int>(k_end); ++k) {
+            if (k == 0 || k == nz - 1) continue;  // border
+            for (int j = 1; j + 1 < ny; ++j) classify_row(j, k);
         }
+    }
+
+    void classify_row(int j, int k) {
+        const std::size_t row = frame_.index(0, j, k);
+        const auto end = static_cast<std::size_t>(frame_.dims[0] - 1);
+        std::uint8_t any = 0;
+        for (std::size_t i = 1; i < end; ++i) {
+            const auto inside = static_cast<std::uint8_t>(values_[row + i] < isolevel_);
+            inside_[row + i] = inside;
+            any |= inside;
+        }
+        if (any == 0) return;
+        const auto begin = inside_.begin() + static_cast<std::ptrdiff_t>(row);
+        Span& span = spans_[span_of(j, k)];
+        while (begin[span.first] == 0) ++span.first;
+        span.last = frame_.dims[0];
+        while (begin[span.last - 1] == 0) --span.last;
+    }
+
+    [[nodiscard]] std::size_t span_of(int j, int k) const {
+        return static_cast<std::size_t>(j) +
+               static_cast<std::size_t>(frame_.dims[1]) * static_cast<std::size_t>(k);
     }
 
     [[nodiscard]] std::size_t step(int axis) const {
@@ -204,36 +229,47 @@ class Extractor {
                                  static_cast<std::size_t>(frame_.dims[1]);
     }
 
-    [[nodiscard]] unsigned pattern(std::size_t node) const {
-        unsigned bits = 0;
-        for (int c = 0; c < kCorners; ++c) {
-            const std::size_t n =
-                node + (c & 1 ? step(0) : 0) + (c & 2 ? step(1) : 0) + (c & 4 ? step(2) : 0);
-            bits |= static_cast<unsigned>(inside_[n]) << c;
-        }
-        return bits;
-    }
-
-    // Calls visit(i, j, node) for the nodes of a layer that are not on its far border where the
-    // border has no edges anyway.
+    // Calls visit(i, j, pattern) for the cubes above a layer that the surface crosses; bit c of the
+    // pattern tells whether corner c is inside. Other cubes have no crossing on any edge.
     template <class Visit>
-    void for_each_node(int k, const Visit& visit) const {
+    void for_each_cube(int k, const Visit& visit) const {
         for (int j = 0; j + 1 < frame_.dims[1]; ++j) {
-            for (int i = 0; i + 1 < frame_.dims[0]; ++i) visit(i, j, frame_.index(i, j, k));
+            const std::array<std::size_t, 4> rows = {span_of(j, k), span_of(j + 1, k),
+                                                     span_of(j, k + 1), span_of(j + 1, k + 1)};
+            Span span{frame_.dims[0], 0};
+            std::array<const std::uint8_t*, 4> inside{};
+            for (std::size_t r = 0; r < 4; ++r) {
+                inside[r] = inside_.data() + step(1) * rows[r];
+                const Span& own = spans_[rows[r]];
+                if (own.first == own.last) continue;
+                span.first = std::min(span.first, own.first);
+                span.last = std::max(span.last, own.last);
+            }
+            unsigned pattern = 0;
+            for (int i = span.first - 1; i < span.last; ++i) {
+                // What was at the far end is now at the near one.
+                pattern = pattern >> 1 & 0x55U;
+                for (std::size_t r = 0; r < 4; ++r) {
+                    pattern |= static_cast<unsigned>(inside[r][i + 1]) << (2 * r + 1);
+                }
+                if (pattern != 0 && pattern != 0xffU) visit(i, j, pattern);
+            }
         }
     }
 
-    [[nodiscard]] bool crossed(std::size_t node, int axis) const {
-        return inside_[node] != inside_[node + step(axis)];
+    // The edge that leaves corner 0 along an axis.
+    static bool crossed(unsigned pattern, int axis) {
+        return ((pattern ^ pattern >> (1U << axis)) & 1U) != 0;
     }
 
     [[nodiscard]] Counts count_layer(int k) const {
         Counts counts;
         if (k + 1 >= frame_.dims[2])
             return counts;  // the far layer is border: no crossing starts there
-        for_each_node(k, [&](int, int, std::size_t node) {
-            for (int axis = 0; axis < 3; ++axis) counts.crossings += crossed(node, axis) ? 1U : 0U;
-            const CubeCase& cube = cube_cases()[pattern(node)];
+        for_each_cube(k, [&](int, int, unsigned pattern) {
+            for (int axis = 0; axis < 3; ++axis)
+                counts.crossings += crossed(pattern, axis) ? 1U : 0U;
+            const CubeCase& cube = cube_cases()[pattern];
             counts.centroids += cube.centred_loops.size();
             counts.triangles += cube.triangles.size();
         });
@@ -243,9 +279,9 @@ class Extractor {
     void number_layer(int k, std::size_t first, LayerIds& ids) const {
         if (k + 1 >= frame_.dims[2]) return;
         auto next = static_cast<std::uint32_t>(first);
-        for_each_node(k, [&](int i, int j, std::size_t node) {
+        for_each_cube(k, [&](int i, int j, unsigned pattern) {
             for (int axis = 0; axis < 3; ++axis) {
-                if (!crossed(node, axis)) continue;
+                if (!crossed(pattern, axis)) continue;
                 ids[static_cast<std::size_t>(i) + step(1) * static_cast<std::size_t>(j)]
                    [static_cast<std::size_t>(axis)] = next++;
             }
@@ -280,12 +316,12 @@ class Extractor {
 
     void fill_layer(int k, Counts next, const LayerIds& here, const LayerIds& above,
                     TriangleMesh& mesh) const {
-        for_each_node(k, [&](int i, int j, std::size_t node) {
+        for_each_cube(k, [&](int i, int j, unsigned pattern) {
             for (int axis = 0; axis < 3; ++axis) {
-                if (crossed(node, axis)) mesh.positions[next.crossings++] = crossing(i, j, k, axis);
+                if (crossed(pattern, axis))
+                    mesh.positions[next.crossings++] = crossing(i, j, k, axis);
             }
-            const CubeCase& cube = cube_cases()[pattern(node)];
-            if (cube.triangles.empty()) return;
+            const CubeCase& cube = cube_cases()[pattern];
             std::array<std::uint32_t, kEdges + 4> ids{};
             for (int e = 0; e < kEdges; ++e) {
                 const EdgeGeometry g = edge_geometry(e);
@@ -315,6 +351,7 @@ class Extractor {
     std::span<const float> values_;
     float isolevel_;
     std::vector<std::uint8_t> inside_;
+    std::vector<Span> spans_;  // by row
 };
 
 }  // namespace

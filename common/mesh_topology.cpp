@@ -4,58 +4,14 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <mutex>
 #include <numeric>
 
-#include "common/parallel.hpp"
-#include "common/triangle_intersection.hpp"
-#include "common/triangle_tree.hpp"
+#include "common/half_edges.hpp"
 
 namespace ellicast::common {
 namespace {
 
 using Eigen::Vector3d;
-
-// A half-edge of a triangle under the key of its undirected edge. Sorting by key brings the
-// triangles of an edge together, in an order that the mesh alone decides.
-struct HalfEdge {
-    std::uint64_t key = 0;  // smaller vertex << 32 | larger vertex
-    std::uint32_t face = 0;
-    std::uint32_t corner = 0;  // 0..2: runs from this corner to the next
-
-    [[nodiscard]] bool is_loop() const { return (key >> 32) == (key & 0xffffffffu); }
-};
-
-std::vector<HalfEdge> sorted_half_edges(const TriangleMesh& mesh) {
-    std::vector<HalfEdge> half_edges;
-    half_edges.reserve(3 * mesh.triangles.size());
-    for (std::size_t f = 0; f < mesh.triangles.size(); ++f) {
-        const Triangle& t = mesh.triangles[f];
-        for (std::uint32_t c = 0; c < 3; ++c) {
-            assert(t[c] < mesh.positions.size());
-            const auto [low, high] = std::minmax(t[c], t[(c + 1) % 3]);
-            half_edges.push_back(
-                {std::uint64_t{low} << 32 | high, static_cast<std::uint32_t>(f), c});
-        }
-    }
-    std::sort(half_edges.begin(), half_edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
-        if (a.key != b.key) return a.key < b.key;
-        return a.face != b.face ? a.face < b.face : a.corner < b.corner;
-    });
-    return half_edges;
-}
-
-// Calls visit(first, last) for the half-edges of each edge.
-template <class Visit>
-void for_each_edge(const std::vector<HalfEdge>& half_edges, const Visit& visit) {
-    const HalfEdge* const end = half_edges.data() + half_edges.size();
-    for (const HalfEdge* first = half_edges.data(); first != end;) {
-        const HalfEdge* last = first;
-        while (last != end && last->key == first->key) ++last;
-        visit(first, last);
-        first = last;
-    }
-}
 
 // Disjoint sets with path halving; the root is always the smallest member.
 class DisjointSets {
@@ -174,22 +130,6 @@ std::int64_t euler_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& hal
     return euler + std::count(used.begin(), used.end(), std::uint8_t{1});
 }
 
-TriangleCorners corners_of(const TriangleMesh& mesh, const Triangle& t) {
-    return {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
-}
-
-Eigen::AlignedBox3d box_of(const TriangleCorners& corners) {
-    Eigen::AlignedBox3d box;
-    for (const Vector3d& p : corners) box.extend(p);
-    return box;
-}
-
-bool share_vertex(const Triangle& s, const Triangle& t) {
-    return std::any_of(s.begin(), s.end(), [&](std::uint32_t v) {
-        return std::find(t.begin(), t.end(), v) != t.end();
-    });
-}
-
 }  // namespace
 
 MeshTopology analyse_topology(const TriangleMesh& mesh) {
@@ -234,76 +174,6 @@ Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh) {
         for (const std::uint32_t corner : t) box.extend(mesh.positions[corner]);
     }
     return box;
-}
-
-namespace {
-
-struct Marked {
-    std::size_t pairs = 0;
-    std::vector<std::uint8_t> faces;  // 1: in a pair
-};
-
-/// Pairs with at least one of `suspects`, which are ascending; each once.
-Marked mark_self_intersections(const TriangleMesh& mesh, std::span<const std::uint32_t> suspects,
-                               unsigned threads) {
-    const TriangleTree tree(mesh);
-    std::vector<std::uint8_t> suspected(mesh.triangles.size(), 0);
-    for (const std::uint32_t f : suspects) suspected[f] = 1;
-    Marked result;
-    result.faces.assign(mesh.triangles.size(), 0);
-    std::mutex merging;
-    parallel_for(suspects.size(), threads, [&](std::size_t begin, std::size_t end) {
-        std::size_t pairs = 0;
-        std::vector<std::uint32_t> found;
-        std::vector<std::uint32_t> candidates;
-        for (const std::uint32_t f : suspects.subspan(begin, end - begin)) {
-            const Triangle& t = mesh.triangles[f];
-            const TriangleCorners corners = corners_of(mesh, t);
-            tree.find_meeting(box_of(corners), candidates);
-            for (const std::uint32_t other : candidates) {
-                const bool counted_there = suspected[other] != 0 && other <= f;
-                if (counted_there || share_vertex(t, mesh.triangles[other])) continue;
-                if (!triangles_meet(corners, corners_of(mesh, mesh.triangles[other]))) continue;
-                ++pairs;
-                found.push_back(f);
-                found.push_back(other);
-            }
-        }
-        // Sums and unions: the order of the threads does not show.
-        const std::lock_guard lock(merging);
-        result.pairs += pairs;
-        for (const std::uint32_t f : found) result.faces[f] = 1;
-    });
-    return result;
-}
-
-std::vector<std::uint32_t> all_faces(const TriangleMesh& mesh) {
-    std::vector<std::uint32_t> faces(mesh.triangles.size());
-    std::iota(faces.begin(), faces.end(), 0u);
-    return faces;
-}
-
-}  // namespace
-
-SelfIntersections count_self_intersections(const TriangleMesh& mesh, unsigned threads) {
-    const Marked marked = mark_self_intersections(mesh, all_faces(mesh), threads);
-    return {marked.pairs, static_cast<std::size_t>(std::count(
-                              marked.faces.begin(), marked.faces.end(), std::uint8_t{1}))};
-}
-
-std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh,
-                                                   std::span<const std::uint32_t> suspects,
-                                                   unsigned threads) {
-    const Marked marked = mark_self_intersections(mesh, suspects, threads);
-    std::vector<std::uint32_t> faces;
-    for (std::uint32_t f = 0; f < marked.faces.size(); ++f) {
-        if (marked.faces[f] != 0) faces.push_back(f);
-    }
-    return faces;
-}
-
-std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh, unsigned threads) {
-    return self_intersecting_faces(mesh, all_faces(mesh), threads);
 }
 
 double signed_volume(const TriangleMesh& mesh) {

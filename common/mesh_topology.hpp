@@ -33,7 +33,7 @@ struct MeshTopology {
     }
 };
 
-/// Linear in the mesh up to a sort. Requires indices in range (asserted).
+/// Linear in the mesh. Requires indices in range (asserted).
 MeshTopology analyse_topology(const TriangleMesh& mesh);
 
 /// Component of every triangle (edge-connected), numbered from 0 in order of first triangle.
@@ -46,23 +46,5 @@ Eigen::AlignedBox3d surface_box(const TriangleMesh& mesh);
 /// Signed volume by the divergence theorem; positive for outward orientation. Meaningful when
 /// closed.
 double signed_volume(const TriangleMesh& mesh);
-
-/// Number of unordered pairs of triangles that share no vertex (by index) and intersect or touch,
-/// and the number of triangles in such pairs. Overlaps in one plane count. Exact
-/// (triangles_meet()), degenerate triangles included. About n log n by a tree. Threads do not
-/// change the result.
-struct SelfIntersections {
-    std::size_t pairs = 0;
-    std::size_t faces = 0;
-};
-SelfIntersections count_self_intersections(const TriangleMesh& mesh, unsigned threads = 0);
-
-/// The triangles in such pairs, ascending.
-std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh, unsigned threads = 0);
-
-/// Those in pairs with at least one of `suspects`. Cost: a tree, and a search for each suspect.
-std::vector<std::uint32_t> self_intersecting_faces(const TriangleMesh& mesh,
-                                                   std::span<const std::uint32_t> suspects,
-                                                   unsigned threads = 0);
 
 }  // namespace ellicast::common

@@ -2,8 +2,10 @@
 #include "common/octahedral_normal.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
+#include <optional>
 
 namespace ellicast::common {
 namespace {
@@ -30,19 +32,31 @@ Vector2d square_of(const Vector3d& n) {
     return n.z() < 0.0 ? fold(p) : p;
 }
 
-}  // namespace
+/// decode_normal() of every code of 8 bits: the encoder asks for nine a normal, and there are
+/// millions of those.
+const std::array<Vector3d, 256>& small_codes() {
+    static const std::array<Vector3d, 256> kNormals = [] {
+        std::array<Vector3d, 256> normals;
+        for (std::uint16_t code = 0; code < 256; ++code) normals[code] = decode_normal(code, 8);
+        return normals;
+    }();
+    return kNormals;
+}
 
-std::uint16_t encode_normal(const Vector3d& n, int bits) {
+/// Of the codes that `fits` takes, one at least of any 2 x 2, the one nearest to `n`; none for a
+/// vector without a direction.
+template <class Fits>
+std::optional<std::uint16_t> nearest_code(const Vector3d& n, int bits, const Fits& fits) {
     assert(is_size(bits));
     const double largest = n.cwiseAbs().maxCoeff();
-    if (!(largest > 0.0) || !n.allFinite()) return 0;
+    if (!(largest > 0.0) || !n.allFinite()) return std::nullopt;
     const Vector3d direction = (n / largest).normalized();
     const int cells = 1 << (bits / 2);
     const Vector2d at = 0.5 * cells * (square_of(direction) + Vector2d::Ones());
     const auto home = [&](double x) { return std::clamp(static_cast<int>(x), 0, cells - 1); };
     // The projection distorts: the nearest centre may be that of a neighbour. None beyond the
     // square's edge, though, for those are mirror images of cells on this side.
-    std::uint16_t best = 0;
+    std::optional<std::uint16_t> best;
     double best_cosine = -2.0;
     const auto first = [](int cell) { return std::max(cell - 1, 0); };
     const auto last = [&](int cell) { return std::min(cell + 1, cells - 1); };
@@ -51,7 +65,9 @@ std::uint16_t encode_normal(const Vector3d& n, int bits) {
     for (int row = first(home_row); row <= last(home_row); ++row) {
         for (int column = first(home_column); column <= last(home_column); ++column) {
             const auto code = static_cast<std::uint16_t>(row * cells + column);
-            const double cosine = direction.dot(decode_normal(code, bits));
+            if (!fits(code)) continue;
+            const double cosine =
+                direction.dot(bits == 8 ? small_codes()[code] : decode_normal(code, bits));
             if (cosine > best_cosine) {
                 best = code;
                 best_cosine = cosine;
@@ -59,6 +75,24 @@ std::uint16_t encode_normal(const Vector3d& n, int bits) {
         }
     }
     return best;
+}
+
+}  // namespace
+
+bool is_marked(std::uint16_t code, int bits) {
+    assert(is_size(bits));
+    return (code & code >> (bits / 2) & 1) != 0;
+}
+
+std::uint16_t encode_normal(const Vector3d& n, int bits) {
+    return nearest_code(n, bits, [](std::uint16_t) { return true; }).value_or(0);
+}
+
+std::uint16_t encode_marked_normal(const Vector3d& n, int bits, bool marked) {
+    const auto first = static_cast<std::uint16_t>(marked ? (1 << (bits / 2)) + 1 : 0);
+    return nearest_code(n, bits,
+                        [&](std::uint16_t code) { return is_marked(code, bits) == marked; })
+        .value_or(first);
 }
 
 Vector3d decode_normal(std::uint16_t code, int bits) {

@@ -16,6 +16,14 @@ namespace ellicast::common {
 /// Requires bits of 8, 12 or 16 (asserted).
 std::uint16_t encode_normal(const Eigen::Vector3d& n, int bits);
 
+/// A code can say one thing more than a direction: those with odd row and odd column are marked.
+/// What a mark means is the business of whoever sets it (common/diagonal_choice.hpp).
+[[nodiscard]] bool is_marked(std::uint16_t code, int bits);
+
+/// As encode_normal, but among the codes that are marked or not, as asked; near the edge of the
+/// square perhaps the second nearest of them. A vector without a direction gives the lowest code.
+std::uint16_t encode_marked_normal(const Eigen::Vector3d& n, int bits, bool marked);
+
 /// Of unit length, whatever the code; higher bits of it are ignored. Same requirement.
 Eigen::Vector3d decode_normal(std::uint16_t code, int bits);
 

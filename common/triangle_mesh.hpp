@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -29,6 +30,17 @@ inline Eigen::AlignedBox3d bounding_box(const std::vector<Eigen::Vector3d>& posi
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : positions) box.extend(p);
     return box;
+}
+
+/// Mean over all triangles' edges; 0 without any. Linear.
+inline double mean_edge_length(const TriangleMesh& mesh) {
+    double sum = 0.0;
+    for (const Triangle& t : mesh.triangles) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            sum += (mesh.positions[t[i]] - mesh.positions[t[(i + 1) % 3]]).norm();
+        }
+    }
+    return mesh.triangles.empty() ? 0.0 : sum / static_cast<double>(3 * mesh.triangles.size());
 }
 
 }  // namespace ellicast::common

@@ -11,39 +11,69 @@
 namespace ellicast::common {
 namespace {
 
-using Eigen::AlignedBox3d;
-using Eigen::AlignedBox3f;
+using Eigen::Array4f;
 using Eigen::Vector3d;
 
 // Leaves of four: fewer make the descent longer, more test triangles in vain.
 constexpr std::size_t kLeafTriangles = 4;
-constexpr int kBins = 16;
+constexpr std::size_t kBins = 8;
 // Below this depth the surface-area heuristic gives way to halving, which bounds the depth by this
 // plus 32 whatever the triangles, and so the size of the query's stack.
 constexpr int kMaxHeuristicDepth = 48;
 constexpr std::size_t kStackSize = kMaxHeuristicDepth + 34;
 
-// Floats that bound the box from outside.
-AlignedBox3f rounded_outwards(const AlignedBox3d& box) {
-    constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    AlignedBox3f result;
-    for (int axis = 0; axis < 3; ++axis) {
-        float low = static_cast<float>(box.min()[axis]);
-        float high = static_cast<float>(box.max()[axis]);
-        if (static_cast<double>(low) > box.min()[axis]) low = std::nextafter(low, -kInfinity);
-        if (static_cast<double>(high) < box.max()[axis]) high = std::nextafter(high, kInfinity);
-        result.min()[axis] = low;
-        result.max()[axis] = high;
-    }
-    return result;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kLargest = std::numeric_limits<float>::max();
+
+// Four lanes are one register; the last is always 0.
+Array4f four(const Vector3d& x) {
+    return {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]), 0.0F};
 }
 
-// Squared distance of x to a box. Never above the squared distance, as squared_distance() computes
+// More than what rounding a double to x changed: a unit in the last place at least, or the least of
+// all floats.
+Array4f last_place(const Array4f& x) {
+    constexpr float kUnit = std::numeric_limits<float>::epsilon();
+    constexpr float kLeast = std::numeric_limits<float>::denorm_min();
+    return (kUnit * x.abs()).max(Array4f(kLeast, kLeast, kLeast, 0.0F));
+}
+
+// What is beyond all floats becomes the largest, or infinite.
+Array4f rounded_down(const Vector3d& x) {
+    const Array4f near = four(x).min(kLargest);
+    return near - last_place(near);
+}
+Array4f rounded_up(const Vector3d& x) {
+    const Array4f near = four(x).max(-kLargest);
+    return near + last_place(near);
+}
+
+struct Box {
+    Array4f low = Array4f::Constant(kInfinity);
+    Array4f high = Array4f::Constant(-kInfinity);
+
+    void extend(const Box& other) {
+        low = low.min(other.low);
+        high = high.max(other.high);
+    }
+    void extend(const Array4f& x) {
+        low = low.min(x);
+        high = high.max(x);
+    }
+};
+
+// Not of an empty one.
+float half_area(const Box& box) {
+    const Array4f s = box.high - box.low;
+    return s[0] * s[1] + s[1] * s[2] + s[2] * s[0];
+}
+
+// Squared distance of x to a box. Never above the squared distance, as the function below computes
 // it, of any point in the box: differences, squares and sums of doubles round monotonically, and
 // both sum in the same order.
-double squared_distance(const Vector3d& x, const AlignedBox3f& box) {
-    const Vector3d low = box.min().cast<double>();
-    const Vector3d high = box.max().cast<double>();
+double squared_distance(const Vector3d& x, const Array4f& box_low, const Array4f& box_high) {
+    const Vector3d low = box_low.head<3>().cast<double>();
+    const Vector3d high = box_high.head<3>().cast<double>();
     const double dx = std::max(0.0, std::max(low[0] - x[0], x[0] - high[0]));
     const double dy = std::max(0.0, std::max(low[1] - x[1], x[1] - high[1]));
     const double dz = std::max(0.0, std::max(low[2] - x[2], x[2] - high[2]));
@@ -57,65 +87,77 @@ double squared_distance(const Vector3d& x, const Vector3d& y) {
     return dx * dx + dy * dy + dz * dz;
 }
 
-double half_area(const AlignedBox3d& box) {
-    if (box.isEmpty()) return 0.0;
-    const Vector3d s = box.sizes();
-    return s[0] * s[1] + s[1] * s[2] + s[2] * s[0];
-}
-
 // What the build knows of a triangle.
 struct Item {
-    AlignedBox3d box;
-    Vector3d center;
+    Box box;  // rounded outwards
     std::uint32_t triangle = 0;
+
+    [[nodiscard]] Array4f center() const { return 0.5F * box.low + 0.5F * box.high; }
 };
 
-struct Bin {
-    AlignedBox3d box;
-    std::size_t count = 0;
+// Items that lie together, and the boxes around them and around their centres.
+struct Part {
+    std::size_t first = 0;
+    std::size_t last = 0;
+    Box box;
+    Box centers;
+
+    void add(const Item& item) {
+        ++last;
+        box.extend(item.box);
+        centers.extend(item.center());
+    }
+    // What is in `other` lies behind this.
+    void append(const Part& other) {
+        last += other.last - other.first;
+        box.extend(other.box);
+        centers.extend(other.centers);
+    }
+    [[nodiscard]] std::size_t size() const { return last - first; }
+    [[nodiscard]] float cost() const { return half_area(box) * static_cast<float>(size()); }
 };
 
-// Which of the equal bins along an axis an item falls into, by its centre.
+using Bins = std::array<Part, kBins>;
+
+// Which of the equal bins along the longest axis of the centres an item falls into.
 class Binning {
   public:
-    Binning(const AlignedBox3d& centers, int axis)
-        : axis_(axis),
-          low_(centers.min()[axis]),
-          scale_(kBins / (centers.max()[axis] - centers.min()[axis])) {}
+    explicit Binning(const Box& centers) {
+        const float length = (centers.high - centers.low).maxCoeff(&axis_);
+        low_ = centers.low[axis_];
+        scale_ = static_cast<float>(kBins) / length;
+    }
 
-    [[nodiscard]] bool valid() const { return std::isfinite(scale_); }
+    // Not where all centres lie in one place.
+    [[nodiscard]] bool valid() const { return scale_ > 0.0F && scale_ <= kLargest; }
 
-    [[nodiscard]] int bin_of(const Item& item) const {
-        return std::clamp(static_cast<int>((item.center[axis_] - low_) * scale_), 0, kBins - 1);
+    [[nodiscard]] std::size_t bin_of(const Item& item) const {
+        const float at = 0.5F * item.box.low[axis_] + 0.5F * item.box.high[axis_];
+        return std::min(static_cast<std::size_t>((at - low_) * scale_), kBins - 1);
     }
 
   private:
-    int axis_;
-    double low_;
-    double scale_;
+    Eigen::Index axis_ = 0;
+    float low_ = 0.0F;
+    float scale_ = 0.0F;
 };
 
-// Surface-area heuristic ([W07]): the cut between bins that makes sum of area x count least.
+// Surface-area heuristic ([W07]): the cut between bins that makes the sum of area x count least.
 // Returns the first bin of the right part; 0 when there is no cut.
-int best_cut(const std::array<Bin, kBins>& bins, double& least_cost) {
-    std::array<double, kBins> cost_right{};
-    Bin right;
-    for (int b = kBins - 1; b > 0; --b) {
-        const Bin& bin = bins[static_cast<std::size_t>(b)];
-        right.box.extend(bin.box);
-        right.count += bin.count;
-        cost_right[static_cast<std::size_t>(b)] =
-            right.count == 0 ? -1.0 : half_area(right.box) * static_cast<double>(right.count);
+std::size_t best_cut(const Bins& bins) {
+    std::array<float, kBins> cost_right{};
+    Part right;
+    for (std::size_t b = kBins - 1; b > 0; --b) {
+        right.append(bins[b]);
+        cost_right[b] = right.size() == 0 ? kInfinity : right.cost();
     }
-    int cut = 0;
-    Bin left;
-    for (int b = 1; b < kBins; ++b) {
-        const Bin& bin = bins[static_cast<std::size_t>(b - 1)];
-        left.box.extend(bin.box);
-        left.count += bin.count;
-        const double of_right = cost_right[static_cast<std::size_t>(b)];
-        if (left.count == 0 || of_right < 0.0) continue;
-        const double cost = half_area(left.box) * static_cast<double>(left.count) + of_right;
+    std::size_t cut = 0;
+    float least_cost = kInfinity;
+    Part left;
+    for (std::size_t b = 1; b < kBins; ++b) {
+        left.append(bins[b - 1]);
+        if (left.size() == 0) continue;
+        const float cost = left.cost() + cost_right[b];
         if (cost < least_cost) {
             least_cost = cost;
             cut = b;
@@ -124,60 +166,56 @@ int best_cut(const std::array<Bin, kBins>& bins, double& least_cost) {
     return cut;
 }
 
-// Splits items [first, last) in place; returns the first item of the right part.
-std::size_t split(std::vector<Item>& items, std::size_t first, std::size_t last, int depth) {
-    const std::size_t half = first + (last - first) / 2;
-    if (depth >= kMaxHeuristicDepth) return half;
-    AlignedBox3d centers;
-    for (std::size_t i = first; i < last; ++i) centers.extend(items[i].center);
-
-    double least_cost = std::numeric_limits<double>::infinity();
-    int best_axis = -1;
-    int cut = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-        const Binning binning(centers, axis);
-        if (!binning.valid()) continue;
-        std::array<Bin, kBins> bins;
-        for (std::size_t i = first; i < last; ++i) {
-            Bin& bin = bins[static_cast<std::size_t>(binning.bin_of(items[i]))];
-            bin.box.extend(items[i].box);
-            ++bin.count;
-        }
-        const int c = best_cut(bins, least_cost);
-        if (c > 0) {
-            best_axis = axis;
-            cut = c;
-        }
-    }
-    if (best_axis < 0) return half;  // all centres in one place
-    const Binning binning(centers, best_axis);
-    const auto begin = items.begin();
-    const auto middle = std::partition(
-        begin + static_cast<std::ptrdiff_t>(first), begin + static_cast<std::ptrdiff_t>(last),
-        [&](const Item& item) { return binning.bin_of(item) < cut; });
-    return static_cast<std::size_t>(middle - begin);
-}
-
 }  // namespace
 
 struct TriangleTree::Builder {
     std::vector<Item> items;
     std::vector<Node> nodes;
 
-    void build(std::size_t first, std::size_t last, int depth) {
+    void build(const Part& part, int depth) {
         const std::size_t at = nodes.size();
-        AlignedBox3d box;
-        for (std::size_t i = first; i < last; ++i) box.extend(items[i].box);
-        nodes.push_back({rounded_outwards(box), 0, 0});
-        if (last - first <= kLeafTriangles) {
-            nodes[at].first = static_cast<std::uint32_t>(first);
-            nodes[at].count = static_cast<std::uint32_t>(last - first);
+        nodes.push_back({part.box.low, part.box.high, 0, 0});
+        if (part.size() <= kLeafTriangles) {
+            nodes[at].first = static_cast<std::uint32_t>(part.first);
+            nodes[at].count = static_cast<std::uint32_t>(part.size());
             return;
         }
-        const std::size_t middle = split(items, first, last, depth);
-        build(first, middle, depth + 1);
+        const auto [left, right] = split(part, depth);
+        build(left, depth + 1);
         nodes[at].first = static_cast<std::uint32_t>(nodes.size());
-        build(middle, last, depth + 1);
+        build(right, depth + 1);
+    }
+
+    // Reorders the items of the part.
+    std::pair<Part, Part> split(const Part& part, int depth) {
+        const Binning binning(part.centers);
+        if (depth >= kMaxHeuristicDepth || !binning.valid()) return halves(part);
+        Bins bins;
+        for (std::size_t i = part.first; i < part.last; ++i) {
+            bins[binning.bin_of(items[i])].add(items[i]);
+        }
+        const std::size_t cut = best_cut(bins);
+        if (cut == 0) return halves(part);
+        const auto begin = items.begin();
+        std::partition(begin + static_cast<std::ptrdiff_t>(part.first),
+                       begin + static_cast<std::ptrdiff_t>(part.last),
+                       [&](const Item& item) { return binning.bin_of(item) < cut; });
+        Part left{part.first, part.first, {}, {}};
+        for (std::size_t b = 0; b < cut; ++b) left.append(bins[b]);
+        Part right{left.last, left.last, {}, {}};
+        for (std::size_t b = cut; b < kBins; ++b) right.append(bins[b]);
+        return {left, right};
+    }
+
+    [[nodiscard]] std::pair<Part, Part> halves(const Part& part) const {
+        const std::size_t half = part.first + part.size() / 2;
+        return {part_of(part.first, half), part_of(half, part.last)};
+    }
+
+    [[nodiscard]] Part part_of(std::size_t first, std::size_t last) const {
+        Part part{first, first, {}, {}};
+        for (std::size_t i = first; i < last; ++i) part.add(items[i]);
+        return part;
     }
 };
 
@@ -187,18 +225,19 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh) {
     if (count == 0) return;
     Builder builder;
     std::vector<Item>& items = builder.items;
-    items.resize(count);
+    items.reserve(count);
     for (std::size_t i = 0; i < count; ++i) {
-        for (const std::uint32_t corner : mesh.triangles[i]) {
-            assert(corner < mesh.positions.size());
-            items[i].box.extend(mesh.positions[corner]);
-        }
-        // Halves first: the sum of two large coordinates may overflow.
-        items[i].center = 0.5 * items[i].box.min() + 0.5 * items[i].box.max();
-        items[i].triangle = static_cast<std::uint32_t>(i);
+        const auto& [a, b, c] = mesh.triangles[i];
+        assert(std::max({a, b, c}) < mesh.positions.size());
+        const Vector3d& p = mesh.positions[a];
+        const Vector3d& q = mesh.positions[b];
+        const Vector3d& r = mesh.positions[c];
+        items.push_back(
+            {{rounded_down(p.cwiseMin(q).cwiseMin(r)), rounded_up(p.cwiseMax(q).cwiseMax(r))},
+             static_cast<std::uint32_t>(i)});
     }
     builder.nodes.reserve(count);
-    builder.build(0, count, 0);
+    builder.build(builder.part_of(0, count), 0);
     nodes_ = std::move(builder.nodes);
 
     corners_.resize(count);
@@ -232,7 +271,7 @@ TriangleTree::Hit TriangleTree::closest(const Vector3d& x, double max_squared_di
     };
     std::array<Waiting, kStackSize> stack;
     std::size_t waiting = 0;
-    if (!nodes_.empty()) stack[waiting++] = {0, squared_distance(x, nodes_[0].box)};
+    if (!nodes_.empty()) stack[waiting++] = {0, squared_distance(x, nodes_[0].low, nodes_[0].high)};
     while (waiting > 0) {
         const Waiting top = stack[--waiting];
         // Equal distance is not skipped: a smaller triangle index may be in there.
@@ -242,8 +281,8 @@ TriangleTree::Hit TriangleTree::closest(const Vector3d& x, double max_squared_di
         while (reachable && nodes_[at].count == 0) {
             std::uint32_t near = at + 1;
             std::uint32_t far = nodes_[at].first;
-            double near2 = squared_distance(x, nodes_[near].box);
-            double far2 = squared_distance(x, nodes_[far].box);
+            double near2 = squared_distance(x, nodes_[near].low, nodes_[near].high);
+            double far2 = squared_distance(x, nodes_[far].low, nodes_[far].high);
             if (far2 < near2) {
                 std::swap(near, far);
                 std::swap(near2, far2);
@@ -256,34 +295,6 @@ TriangleTree::Hit TriangleTree::closest(const Vector3d& x, double max_squared_di
     }
     if (best.triangle == std::numeric_limits<std::uint32_t>::max()) return Hit();
     return best;
-}
-
-void TriangleTree::find_meeting(const AlignedBox3d& box,
-                                std::vector<std::uint32_t>& triangles) const {
-    triangles.clear();
-    const auto meets = [](const AlignedBox3d& a, const AlignedBox3d& b) {
-        return (a.min().array() <= b.max().array()).all() &&
-               (b.min().array() <= a.max().array()).all();
-    };
-    std::array<std::uint32_t, kStackSize> stack;
-    std::size_t waiting = 0;
-    if (!nodes_.empty()) stack[waiting++] = 0;
-    while (waiting > 0) {
-        const std::uint32_t at = stack[--waiting];
-        const Node& node = nodes_[at];
-        if (!meets(box, node.box.cast<double>())) continue;
-        if (node.count == 0) {
-            stack[waiting++] = node.first;
-            stack[waiting++] = at + 1;
-            continue;
-        }
-        for (std::uint32_t slot = node.first; slot < node.first + node.count; ++slot) {
-            const auto& [a, b, c] = corners_[slot];
-            const AlignedBox3d own(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
-            if (meets(box, own)) triangles.push_back(triangle_of_slot_[slot]);
-        }
-    }
-    std::sort(triangles.begin(), triangles.end());
 }
 
 }  // namespace ellicast::common

@@ -33,17 +33,13 @@ class TriangleTree {
         const Eigen::Vector3d& x,
         double max_squared_distance = std::numeric_limits<double>::infinity()) const;
 
-    /// All triangles whose bounding boxes meet or touch `box`, ascending, into `triangles` (what
-    /// was in there goes; the caller keeps the vector from query to query to save allocations).
-    void find_meeting(const Eigen::AlignedBox3d& box, std::vector<std::uint32_t>& triangles) const;
-
     [[nodiscard]] bool empty() const { return corners_.empty(); }
 
   private:
     struct Node {
-        Eigen::AlignedBox3f box;  // rounded outwards
-        std::uint32_t first = 0;  // leaf: first triangle slot; inner: right child
-        std::uint32_t count = 0;  // 0: inner node, left child follows it
+        Eigen::Array4f low, high;  // of its box, rounded outwards; the last of four is 0
+        std::uint32_t first = 0;   // leaf: first triangle slot; inner: right child
+        std::uint32_t count = 0;   // 0: inner node, left child follows it
     };
     struct Builder;
 

@@ -3,8 +3,9 @@
 
 #include <cassert>
 
-#include "protocol/acceptance.hpp"
+#include "protocol/byte_reader.hpp"
 #include "protocol/description.hpp"
+#include "protocol/page.hpp"
 #include "protocol/vertex_tags.hpp"
 
 namespace ellicast::protocol {
@@ -66,21 +67,59 @@ RecordFormat RecordFormat::of_code(std::uint8_t code) {
             .colour = (code & kFormatColour) != 0};
 }
 
+void SectionView::read(std::size_t k, std::span<EllipsoidRecord> out) const {
+    assert(kind == SectionKind::ellipsoids && k + out.size() <= count);
+    const std::uint8_t* p = body.data() + k * kEllipsoidBytes;
+    for (EllipsoidRecord& record : out) {
+        for (float& x : record.scalars) {
+            x = load_f32(p);
+            p += sizeof(float);
+        }
+    }
+}
+
+void SectionView::read(std::size_t k, std::span<VertexRecord> out) const {
+    assert(kind == SectionKind::vertices && k + out.size() <= count);
+    const std::uint8_t* p = body.data() + k * kVertexBytes;
+    for (VertexRecord& record : out) {
+        // Field by field: a whole record built aside and then copied waits for its own stores.
+        for (float& x : record.position) {
+            x = load_f32(p);
+            p += sizeof(float);
+        }
+        record.normal = record.ring = 0;
+        record.colour = {};
+        record.unused = 0;
+    }
+    if (format != RecordFormat{}) load_tags(format, body, count, k, out);
+}
+
 EllipsoidRecord SectionView::ellipsoid(std::size_t k) const {
-    assert(kind == SectionKind::ellipsoids && k < count);
-    return load_ellipsoid(body.data() + k * kEllipsoidBytes);
+    EllipsoidRecord record;
+    read(k, std::span(&record, 1));
+    return record;
 }
 
 VertexRecord SectionView::vertex(std::size_t k) const {
-    assert(kind == SectionKind::vertices && k < count);
-    VertexRecord record = load_position(body.data() + k * kVertexBytes);
-    if (format != RecordFormat{}) load_tags(format, body, count, k, record);
+    VertexRecord record;
+    read(k, std::span(&record, 1));
     return record;
+}
+
+EdgeRecord SectionView::edge(std::size_t k) const {
+    assert(kind == SectionKind::edges && k < count);
+    const std::uint8_t* const p = body.data() + k * kEdgeBytes;
+    return {among, load_u32(p), load_u32(p + 4)};
 }
 
 Description SectionView::description() const {
     assert(kind == SectionKind::description);
     return decode_description(body);
+}
+
+PageEntry SectionView::page() const {
+    assert(kind == SectionKind::page);
+    return decode_page(body);
 }
 
 }  // namespace ellicast::protocol

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "protocol/result.hpp"
+#include "protocol/strided.hpp"
 
 /// Bytes <-> structs of the ellicast wire. protocol/WIRE_FORMAT.md is the law; this header follows
 /// it. No I/O, no clock, no mesh types. All numbers on the wire are big-endian.
@@ -35,10 +36,14 @@ inline constexpr double kMinRadius = 1e-6;     // of an ellipsoid, in diagonals;
 inline constexpr double kCenterSlack = 0.05;   // of a centre beyond the box, in diagonals
 
 inline constexpr std::size_t kEllipsoidBytes = 36;
-inline constexpr std::size_t kVertexBytes = 12;         // of the position; tags come on top
+inline constexpr std::size_t kVertexBytes = 12;  // of the position; tags come on top
+inline constexpr std::size_t kEdgeBytes = 8;
 inline constexpr std::size_t kHeaderBytes = 89;         // RTP header, our header and hint
 inline constexpr std::size_t kTrailerBytes = 4;         // CRC-32C
-inline constexpr std::size_t kSectionHeaderBytes = 13;  // of a section of records
+inline constexpr std::size_t kSectionHeaderBytes = 13;  // of a section of ellipsoids or vertices
+inline constexpr std::size_t kEdgeSectionBytes = 9;     // in front of a section's edges
+/// Of a writer: what sealing and signing leave of the smallest datagram (secured_datagram.hpp).
+inline constexpr std::size_t kLeastCapacity = kMinDatagramBytes - 108;
 
 using SessionId = std::array<std::uint8_t, 8>;
 using ObjectId = std::array<std::uint8_t, 8>;
@@ -58,6 +63,15 @@ struct VertexRecord {
     std::array<std::uint8_t, 3> colour{};  // red green blue
     std::uint8_t unused = 0;
     bool operator==(const VertexRecord&) const = default;
+};
+
+/// An edge a b of the mesh that is left of the original when vertices with index `among` and above
+/// are collapsed; a < b < among. With among = Hint::vertices, one of the original itself.
+struct EdgeRecord {
+    std::uint32_t among = 0;
+    std::uint32_t a = 0;
+    std::uint32_t b = 0;
+    auto operator<=>(const EdgeRecord&) const = default;
 };
 
 /// What a vertex record holds beside its position.
@@ -132,7 +146,13 @@ struct DatagramHeader {
     bool operator==(const DatagramHeader&) const = default;
 };
 
-enum class SectionKind : std::uint8_t { ellipsoids = 1, vertices = 2, description = 3 };
+enum class SectionKind : std::uint8_t {
+    ellipsoids = 1,
+    vertices = 2,
+    description = 3,
+    page = 4,
+    edges = 5
+};
 
 /// What is worth knowing but not needed to rebuild. Strings are UTF-8 without control characters,
 /// at most 255 bytes each.
@@ -145,20 +165,38 @@ struct Description {
     bool operator==(const Description&) const = default;
 };
 
+/// A line of a carousel's table of contents. Any datagram may carry that of any page, so that one
+/// learns soon what is on air.
+struct PageEntry {
+    std::uint16_t page = 0;     // its place in the carousel, from 0
+    std::uint16_t pages = 1;    // in the carousel
+    std::uint32_t version = 1;  // of the page in this session: plus one whenever its object changes
+    ObjectId object{};          // that is sent as this page now
+    std::uint32_t components = 1;  // this and the next three as in the object's hint
+    std::int32_t euler_all = 2;
+    std::uint16_t ellipsoids = 0;
+    std::uint32_t vertices = 0;
+    std::string name;  // the description's, cut to kMaxPageNameBytes
+    bool operator==(const PageEntry&) const = default;
+};
+inline constexpr std::size_t kMaxPageNameBytes = 48;
+
 /// Why a datagram was dropped. Each is counted apart by the receiver; to_string gives the report's
 /// key.
 enum class WireError : std::uint8_t {
     too_short,           // fewer bytes than header and trailer
     not_rtp,             // RTP version is not 2, or padding, an extension or sources are announced
     unknown_version,     // our version byte is another
-    unsupported_flags,   // a reserved flag (sealed, signed) or an unknown one is set
+    unsupported_flags,   // an unknown flag is set; of parse_datagram: sealed or signed, too
     bad_checksum,        // CRC-32C differs
     bad_hint,            // box not finite or empty, counts over the limits, impossible topology
     bad_round,           // ordinal or round outside what the same header says there is
     bad_section,         // past the end, length against count, no record; none, over kMaxSections
-    index_out_of_range,  // a record's index is not below the hinted count, or stride is 0
+    index_out_of_range,  // a record's index is not below the hinted count, or stride is 0; ends of
+                         // an edge that do not ascend
     bad_record,          // not finite, outside the hinted box (5 % slack for centres), bad radius
-    bad_description,     // lengths that miss the end, control characters, no UTF-8, bad origin
+    bad_description,     // or page: lengths that miss the end, control characters, no UTF-8, bad
+                         // numbers
     kCount
 };
 std::string_view to_string(WireError error);
@@ -169,8 +207,9 @@ struct SectionView {
     RecordFormat format;       // of vertices
     std::uint32_t first = 0;   // index of record 0
     std::uint32_t stride = 1;  // record k has index first + k * stride
+    std::uint32_t among = 0;   // of edges
     std::uint16_t count = 0;
-    std::span<const std::uint8_t> body;  // records, or the description's bytes
+    std::span<const std::uint8_t> body;  // records, or the description's or page's bytes
 
     /// Requires k < count.
     [[nodiscard]] std::uint32_t index(std::size_t k) const {
@@ -179,7 +218,14 @@ struct SectionView {
     /// Requires the kind and k < count (asserted).
     [[nodiscard]] EllipsoidRecord ellipsoid(std::size_t k) const;
     [[nodiscard]] VertexRecord vertex(std::size_t k) const;
+    [[nodiscard]] EdgeRecord edge(std::size_t k) const;
     [[nodiscard]] Description description() const;
+    [[nodiscard]] PageEntry page() const;
+
+    /// Decodes records k, k + 1, ... until `out` is full; many at once are cheaper. Requires the
+    /// kind and k + out.size() <= count (asserted).
+    void read(std::size_t k, std::span<EllipsoidRecord> out) const;
+    void read(std::size_t k, std::span<VertexRecord> out) const;
 };
 
 /// A datagram whose every byte was checked; refers to the bytes it was parsed from. Sections of
@@ -193,8 +239,9 @@ struct DatagramView {
     }
 };
 
-/// Checks everything that can be checked without state: see WireError for what, WIRE_FORMAT.md for
-/// the bounds. Never allocates, never throws; linear in the bytes.
+/// Checks everything of a clear datagram that can be checked without state: see WireError for what,
+/// WIRE_FORMAT.md for the bounds. secured_datagram.hpp makes clear ones of the others. Never
+/// allocates, never throws; linear in the bytes.
 Result<DatagramView, WireError> parse_datagram(std::span<const std::uint8_t> bytes);
 
 /// Bytes of the hint (with its approximate flag) in canonical form, as the object id and the
@@ -216,23 +263,31 @@ bool acceptable(const VertexRecord& record, const Hint& hint);
 /// has, and of a tag as many bits as it has there.
 class DatagramWriter {
   public:
-    /// Requires kMinDatagramBytes <= capacity <= kMaxDatagramBytes (asserted).
-    DatagramWriter(const DatagramHeader& header, std::size_t capacity);
+    /// Requires kLeastCapacity <= capacity <= kMaxDatagramBytes (asserted). Builds in the memory
+    /// of `spent`, such as a datagram that was sent; its content is forgotten.
+    DatagramWriter(const DatagramHeader& header, std::size_t capacity,
+                   std::vector<std::uint8_t> spent = {});
 
     /// How many records still fit into a new section (0 when not even its header does).
     [[nodiscard]] std::size_t ellipsoids_that_fit() const;
     [[nodiscard]] std::size_t vertices_that_fit() const;
+    [[nodiscard]] std::size_t edges_that_fit() const;
 
     /// Adds a section of records with indices first, first + stride, ... Requires that they fit,
     /// that there is at least one, and fewer than kMaxSections sections so far (asserted).
     void add_ellipsoids(std::uint32_t first, std::uint32_t stride,
-                        std::span<const EllipsoidRecord> records);
+                        const Strided<EllipsoidRecord>& records);
     void add_vertices(std::uint32_t first, std::uint32_t stride,
-                      std::span<const VertexRecord> records);
+                      const Strided<VertexRecord>& records);
+    /// Adds a section of edges, whose `among` must be the same (asserted). Requires the same of
+    /// them and of the datagram.
+    void add_edges(std::span<const EdgeRecord> edges);
     /// False, and nothing added, when it does not fit. Strings are cut to 255 bytes at a
     /// character's border, control characters and what is not UTF-8 replaced by '_'. Requires an
     /// origin that is finite and within kMaxCoordinate (asserted).
     [[nodiscard]] bool add_description(const Description& description);
+    /// Likewise. Requires what encode_page does (asserted).
+    [[nodiscard]] bool add_page(const PageEntry& entry);
 
     /// Appends the checksum and hands the bytes out; the writer is spent. Requires a section
     /// (asserted), for no receiver takes a datagram without.
@@ -241,6 +296,7 @@ class DatagramWriter {
   private:
     [[nodiscard]] std::size_t free_bytes() const;
     [[nodiscard]] std::size_t record_room() const;  // bytes of records in a new section
+    [[nodiscard]] bool add_body(SectionKind kind, std::span<const std::uint8_t> body);
 
     std::vector<std::uint8_t> bytes_;
     RecordFormat format_;

@@ -7,6 +7,7 @@
 #include "protocol/crc32c.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/description.hpp"
+#include "protocol/page.hpp"
 #include "protocol/vertex_tags.hpp"
 #include "protocol/wire_layout.hpp"
 
@@ -113,6 +114,24 @@ Fault read_records(Bytes body, const Hint& hint, const RecordBounds& bounds, Sec
     return {};
 }
 
+/// Edges: between whom they are, then their ends.
+Fault read_edges(Bytes body, const Hint& hint, SectionView& section) {
+    ByteReader reader(body);
+    section.count = reader.u16();
+    section.among = reader.u32();
+    section.body = reader.bytes(reader.left());
+    if (reader.failed() || section.count == 0 ||
+        section.body.size() != section.count * kEdgeBytes) {
+        return WireError::bad_section;
+    }
+    if (section.among > hint.vertices) return WireError::index_out_of_range;
+    for (std::size_t k = 0; k < section.count; ++k) {
+        const EdgeRecord edge = section.edge(k);
+        if (edge.a >= edge.b || edge.b >= section.among) return WireError::index_out_of_range;
+    }
+    return {};
+}
+
 Fault read_section(ByteReader& reader, const RecordBounds& bounds, DatagramView& view) {
     const std::uint8_t kind = reader.u8();
     const std::uint16_t length = reader.u16();
@@ -130,6 +149,13 @@ Fault read_section(ByteReader& reader, const RecordBounds& bounds, DatagramView&
             break;
         case SectionKind::description:
             if (!is_description(body)) return WireError::bad_description;
+            section.body = body;
+            break;
+        case SectionKind::edges:
+            if (const Fault fault = read_edges(body, view.header.hint, section)) return fault;
+            break;
+        case SectionKind::page:
+            if (!is_page(body)) return WireError::bad_description;
             section.body = body;
             break;
         default:

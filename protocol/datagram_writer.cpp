@@ -1,5 +1,7 @@
 // protocol/datagram_writer.cpp
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cassert>
 #include <utility>
 
@@ -7,6 +9,7 @@
 #include "protocol/crc32c.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/description.hpp"
+#include "protocol/page.hpp"
 #include "protocol/vertex_tags.hpp"
 #include "protocol/wire_layout.hpp"
 
@@ -22,7 +25,8 @@ void write_rtp(ByteWriter& writer, const RtpHeader& rtp) {
     writer.u32(rtp.ssrc);
 }
 
-void write_hint(ByteWriter& writer, const Hint& hint) {
+template <class Writer>
+void write_hint(Writer& writer, const Hint& hint) {
     for (const float x : hint.box_min) writer.f32(x);
     for (const float x : hint.box_max) writer.f32(x);
     writer.u32(hint.components);
@@ -47,6 +51,18 @@ void write_header(ByteWriter& writer, const DatagramHeader& header) {
     writer.u32(header.datagrams);
 }
 
+// Records of later rounds lie a stride apart, each in a cache line of its own where no processor
+// looks for it: this many are asked for beforehand, those of the next datagram too.
+constexpr std::size_t kAhead = 24;
+
+template <std::size_t N>
+std::uint8_t* store_floats(std::uint8_t* out, const std::array<float, N>& values) {
+    for (std::size_t k = 0; k < N; ++k) {
+        store_u32(out + 4 * k, std::bit_cast<std::uint32_t>(values[k]));
+    }
+    return out + 4 * N;
+}
+
 /// In front of the records: `bytes` is what they take.
 void write_section_header(ByteWriter& writer, SectionKind kind, std::uint32_t first,
                           std::uint32_t stride, std::size_t count, std::size_t bytes) {
@@ -60,20 +76,19 @@ void write_section_header(ByteWriter& writer, SectionKind kind, std::uint32_t fi
 }  // namespace
 
 std::array<std::uint8_t, kCanonicalHintBytes> canonical_bytes(const Hint& hint) {
-    std::vector<std::uint8_t> bytes;
-    bytes.reserve(kCanonicalHintBytes);
-    ByteWriter writer(bytes);
+    std::array<std::uint8_t, kCanonicalHintBytes> out{};
+    FixedWriter writer(out);
     write_hint(writer, hint);
     writer.u8(hint.approximate ? 1 : 0);
-    std::array<std::uint8_t, kCanonicalHintBytes> out{};
-    assert(bytes.size() == out.size());
-    std::ranges::copy(bytes, out.begin());
+    assert(writer.left() == 0);
     return out;
 }
 
-DatagramWriter::DatagramWriter(const DatagramHeader& header, std::size_t capacity)
-    : format_(header.hint.format), capacity_(capacity) {
-    assert(capacity >= kMinDatagramBytes && capacity <= kMaxDatagramBytes);
+DatagramWriter::DatagramWriter(const DatagramHeader& header, std::size_t capacity,
+                               std::vector<std::uint8_t> spent)
+    : bytes_(std::move(spent)), format_(header.hint.format), capacity_(capacity) {
+    assert(capacity >= kLeastCapacity && capacity <= kMaxDatagramBytes);
+    bytes_.clear();
     bytes_.reserve(capacity);
     ByteWriter writer(bytes_);
     write_header(writer, header);
@@ -97,36 +112,65 @@ std::size_t DatagramWriter::vertices_that_fit() const {
     return format_.vertices_within(record_room());
 }
 
+std::size_t DatagramWriter::edges_that_fit() const {
+    if (sections_ == kMaxSections || free_bytes() < kEdgeSectionBytes) return 0;
+    return (std::min<std::size_t>(free_bytes(), 0xffff) - kEdgeSectionBytes) / kEdgeBytes;
+}
+
 void DatagramWriter::add_ellipsoids(std::uint32_t first, std::uint32_t stride,
-                                    std::span<const EllipsoidRecord> records) {
+                                    const Strided<EllipsoidRecord>& records) {
     assert(!records.empty() && records.size() <= ellipsoids_that_fit());
     ByteWriter writer(bytes_);
     write_section_header(writer, SectionKind::ellipsoids, first, stride, records.size(),
                          records.size() * kEllipsoidBytes);
-    for (const EllipsoidRecord& record : records) {
-        for (const float x : record.scalars) writer.f32(x);
-    }
+    std::uint8_t* out = writer.grow(records.size() * kEllipsoidBytes);
+    for (std::size_t k = 0; k < records.size(); ++k) out = store_floats(out, records[k].scalars);
     ++sections_;
 }
 
 void DatagramWriter::add_vertices(std::uint32_t first, std::uint32_t stride,
-                                  std::span<const VertexRecord> records) {
+                                  const Strided<VertexRecord>& records) {
     assert(!records.empty() && records.size() <= vertices_that_fit());
     ByteWriter writer(bytes_);
     write_section_header(writer, SectionKind::vertices, first, stride, records.size(),
                          format_.vertex_bytes(records.size()));
-    for (const VertexRecord& record : records) {
-        for (const float x : record.position) writer.f32(x);
+    std::uint8_t* out = writer.grow(records.size() * kVertexBytes);
+    for (std::size_t k = 0; k < records.size(); ++k) {
+        records.prefetch(k + kAhead);
+        out = store_floats(out, records[k].position);
     }
     write_tags(format_, records, writer);
     ++sections_;
 }
 
+void DatagramWriter::add_edges(std::span<const EdgeRecord> edges) {
+    assert(!edges.empty() && edges.size() <= edges_that_fit());
+    ByteWriter writer(bytes_);
+    writer.u8(static_cast<std::uint8_t>(SectionKind::edges));
+    writer.u16(static_cast<std::uint16_t>(kEdgeSectionBytes - kKindAndLengthBytes +
+                                          edges.size() * kEdgeBytes));
+    writer.u16(static_cast<std::uint16_t>(edges.size()));
+    writer.u32(edges.front().among);
+    for (const EdgeRecord& edge : edges) {
+        assert(edge.among == edges.front().among);
+        writer.u32(edge.a);
+        writer.u32(edge.b);
+    }
+    ++sections_;
+}
+
 bool DatagramWriter::add_description(const Description& description) {
-    const std::vector<std::uint8_t> body = encode_description(description);
+    return add_body(SectionKind::description, encode_description(description));
+}
+
+bool DatagramWriter::add_page(const PageEntry& entry) {
+    return add_body(SectionKind::page, encode_page(entry));
+}
+
+bool DatagramWriter::add_body(SectionKind kind, std::span<const std::uint8_t> body) {
     if (sections_ == kMaxSections || free_bytes() < kKindAndLengthBytes + body.size()) return false;
     ByteWriter writer(bytes_);
-    writer.u8(static_cast<std::uint8_t>(SectionKind::description));
+    writer.u8(static_cast<std::uint8_t>(kind));
     writer.u16(static_cast<std::uint16_t>(body.size()));
     writer.bytes(body);
     ++sections_;

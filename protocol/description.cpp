@@ -74,13 +74,13 @@ bool is_presentable(std::string_view text) {
     return true;
 }
 
-std::string presentable(std::string_view text) {
+std::string presentable(std::string_view text, std::size_t most) {
     std::string out;
     while (!text.empty()) {
         const Character c = first_character(text);
         const bool keep = c.length > 0 && !is_control(c.code);
         const std::string_view shown = keep ? text.substr(0, c.length) : std::string_view("_");
-        if (out.size() + shown.size() > kMaxStringBytes) break;
+        if (out.size() + shown.size() > most) break;
         out += shown;
         text.remove_prefix(std::max<std::size_t>(1, c.length));
     }

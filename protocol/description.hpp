@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "protocol/datagram.hpp"
+#include "protocol/wire_layout.hpp"
 
 namespace ellicast::protocol {
 
@@ -27,7 +28,7 @@ std::vector<std::uint8_t> encode_description(const Description& description);
 bool is_presentable(std::string_view text);
 
 /// The text with every control character and every byte that is no UTF-8 replaced by '_', cut at a
-/// character's border to at most 255 bytes.
-std::string presentable(std::string_view text);
+/// character's border to at most so many bytes.
+std::string presentable(std::string_view text, std::size_t most = kMaxStringBytes);
 
 }  // namespace ellicast::protocol

@@ -13,7 +13,7 @@ using Bytes = std::span<const std::uint8_t>;
 
 bool is_known(std::uint8_t kind) {
     return kind >= static_cast<std::uint8_t>(SectionKind::ellipsoids) &&
-           kind <= static_cast<std::uint8_t>(SectionKind::description);
+           kind <= static_cast<std::uint8_t>(SectionKind::edges);
 }
 
 }  // namespace

@@ -14,12 +14,16 @@ inline constexpr std::size_t kSequenceOffset = 2;
 inline constexpr std::size_t kTimestampOffset = 4;
 inline constexpr std::size_t kVersionOffset = 12;
 inline constexpr std::size_t kFlagsOffset = 13;
+inline constexpr std::size_t kSessionOffset = 14;
 inline constexpr std::size_t kHintOffset = 30;
 inline constexpr std::size_t kHintBytes = 43;
 inline constexpr std::size_t kRoundOffset = 73;
 
 inline constexpr std::uint8_t kFlagApproximate = 0x01;
-// 0x02 sealed and 0x04 signed are reserved; like all other bits they are refused.
+inline constexpr std::uint8_t kFlagSealed = 0x02;
+inline constexpr std::uint8_t kFlagSigned = 0x04;
+// All other bits are refused; so are these two by parse_datagram, which reads clear datagrams
+// alone.
 
 inline constexpr std::size_t kKindAndLengthBytes = 3;  // in front of every section's body
 inline constexpr std::size_t kIndexBytes = 10;         // count, first, stride in front of records

@@ -9,8 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/mesh_topology.hpp"
+#include "common/half_edges.hpp"
 #include "common/parallel.hpp"
+#include "common/self_intersection.hpp"
 #include "common/vertex_normals.hpp"
 
 namespace ellicast::receiver {
@@ -36,39 +37,116 @@ constexpr int kMostHalvings = 3;
 // An edge is split again when it is longer than this many cells of the coarse surface.
 constexpr double kLongEdge = 2.0;
 
+// How much of its bulge an edge gets, by its size (ln of length x square root of area over what is
+// usual around it): a logistic curve of this width. Where it has its middle and where it ends
+// follows the share of vertices that are missing. Fitted to edges of six models at 10, 30 and 50 %
+// loss, without tags and with; rms over that of one strength for all edges, the square root of
+// twice the loss, five models: 0.98, 0.97 and 0.99 with tags (spot 0.92, 0.95, 0.98).
+constexpr double kSizeWidth = 0.3;
+double usual_gap_size(double missing) {
+    return -1.07 - 0.55 * std::log(missing);
+}
+double most_strength(double missing) {
+    return std::min(1.0, 0.4 + 1.5 * missing);
+}
+// Of edges that are split again, whatever their size.
+double even_strength(double missing) {
+    return std::sqrt(std::min(1.0, 2.0 * missing));
+}
+
 struct Edge {
     std::uint32_t a = 0, b = 0;                         // ends
     std::array<std::uint32_t, 2> triangle{}, corner{};  // where it is side `corner`
 };
 
 std::vector<Edge> edges_of(const TriangleMesh& mesh) {
-    struct Side {
-        std::uint64_t key;
-        std::uint32_t triangle;
-        std::uint32_t corner;
-    };
-    std::vector<Side> sides;
-    sides.reserve(3 * mesh.triangles.size());
-    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-        for (std::uint32_t k = 0; k < 3; ++k) {
-            const std::uint64_t a = mesh.triangles[t][k];
-            const std::uint64_t b = mesh.triangles[t][(k + 1) % 3];
-            sides.push_back({std::min(a, b) << 32 | std::max(a, b), t, k});
-        }
-    }
-    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-        return std::pair(a.key, a.triangle) < std::pair(b.key, b.triangle);
-    });
+    const std::vector<common::HalfEdge> half_edges = common::sorted_half_edges(mesh);
     std::vector<Edge> edges;
-    edges.reserve(sides.size() / 2);
-    for (std::size_t k = 0; k + 1 < sides.size(); k += 2) {
-        assert(sides[k].key == sides[k + 1].key);
-        edges.push_back({static_cast<std::uint32_t>(sides[k].key >> 32),
-                         static_cast<std::uint32_t>(sides[k].key & 0xffffffffU),
-                         {sides[k].triangle, sides[k + 1].triangle},
-                         {sides[k].corner, sides[k + 1].corner}});
+    edges.reserve(half_edges.size() / 2);
+    for (std::size_t k = 0; k + 1 < half_edges.size(); k += 2) {
+        const common::HalfEdge& h = half_edges[k];
+        const common::HalfEdge& g = half_edges[k + 1];
+        assert(h.key == g.key);
+        edges.push_back({static_cast<std::uint32_t>(h.key >> 32),
+                         static_cast<std::uint32_t>(h.key & 0xffffffffU),
+                         {h.face, g.face},
+                         {h.corner, g.corner}});
     }
     return edges;
+}
+
+// What is usual around the vertices of a mesh: means over the stars of a vertex and of its
+// neighbours.
+class Surroundings {
+  public:
+    Surroundings(const TriangleMesh& mesh, const std::vector<Edge>& edges)
+        : mesh_(mesh), edges_(edges), area_(mesh.triangles.size()) {
+        std::vector<Star> stars(mesh.positions.size());
+        for (std::size_t t = 0; t < area_.size(); ++t) {
+            const auto& [a, b, c] = mesh.triangles[t];
+            const Vector3d& p = mesh.positions[a];
+            area_[t] = 0.5 * (mesh.positions[b] - p).cross(mesh.positions[c] - p).norm();
+            for (const std::uint32_t v : mesh.triangles[t]) stars[v].area += area_[t];
+        }
+        for (const Edge& e : edges) {
+            for (const std::uint32_t v : {e.a, e.b}) {
+                stars[v].length += length(e);
+                stars[v].edges += 1.0;
+            }
+        }
+        around_ = stars;
+        for (const Edge& e : edges) {
+            around_[e.a] += stars[e.b];
+            around_[e.b] += stars[e.a];
+        }
+    }
+
+    // ln of length x square root of area of the triangles beside it, over what is usual; 0 where
+    // there is nothing to compare.
+    [[nodiscard]] double size(std::size_t k) const {
+        const Edge& e = edges_[k];
+        Star usual = around_[e.a];
+        usual += around_[e.b];
+        const double area = 0.5 * (area_[e.triangle[0]] + area_[e.triangle[1]]);
+        const double ratio = length(e) / usual.length * std::sqrt(area / usual.area);
+        // A closed star has as many edges as triangles.
+        const double size = std::log(ratio * usual.edges * std::sqrt(usual.edges));
+        return std::isfinite(size) ? size : 0.0;
+    }
+
+  private:
+    struct Star {
+        double length = 0, area = 0, edges = 0;  // sums
+        void operator+=(const Star& other) {
+            length += other.length;
+            area += other.area;
+            edges += other.edges;
+        }
+    };
+
+    [[nodiscard]] double length(const Edge& e) const {
+        return (mesh_.positions[e.a] - mesh_.positions[e.b]).norm();
+    }
+
+    const TriangleMesh& mesh_;
+    const std::vector<Edge>& edges_;
+    std::vector<double> area_;  // of each triangle
+    std::vector<Star> around_;  // of each vertex
+};
+
+// Between vertices that lost nothing the original has the edge, and it is straight; what is large
+// among its neighbours probably crosses a gap.
+std::vector<double> strengths_of(const TriangleMesh& mesh, const std::vector<Edge>& edges,
+                                 double missing) {
+    const Surroundings surroundings(mesh, edges);
+    const double usual = usual_gap_size(missing);
+    const double most = most_strength(missing);
+    std::vector<double> strengths(edges.size());
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+        const double excess = (surroundings.size(k) - usual) / kSizeWidth;
+        strengths[k] = most / (1.0 + std::exp(-excess));
+    }
+    return strengths;
 }
 
 // DESIGN section 7. Zero where the two normals ask for opposite sides: an inflexion, or a crease.
@@ -205,16 +283,22 @@ void split(const std::vector<Edge>& edges, const std::vector<Vector3d>& bulges,
 }  // namespace
 
 Concealed conceal(const TriangleMesh& mesh, std::vector<KnownVertex> vertices,
-                  const ShapeGuide& guide, double strength, unsigned threads) {
+                  const ShapeGuide& guide, const Gaps& gaps, unsigned threads) {
     assert(vertices.size() == mesh.positions.size());
     assert(guide.surface && guide.cell > 0.0);
     Concealed result{mesh, {}};
     for (int n = 0; n < kMostLevels; ++n) {
         const std::vector<Edge> edges = edges_of(result.mesh);
         const Level level(result.mesh, vertices, guide, n == 0);
+        std::vector<double> strengths =
+            n == 0 ? strengths_of(result.mesh, edges, gaps.missing)
+                   : std::vector<double>(edges.size(), even_strength(gaps.missing));
+        for (double& strength : strengths) strength = std::max(strength, gaps.least_strength);
         std::vector<Vector3d> bulges(edges.size());
         common::parallel_for(edges.size(), threads, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t k = begin; k < end; ++k) bulges[k] = strength * level.bulge(edges[k]);
+            for (std::size_t k = begin; k < end; ++k) {
+                bulges[k] = strengths[k] * level.bulge(edges[k]);
+            }
         });
         const std::size_t before = result.mesh.positions.size();
         split(edges, bulges, result, vertices);
@@ -236,7 +320,8 @@ std::size_t flatten_intersections(Concealed& concealed, unsigned threads) {
     for (std::size_t k = 0; k < parents.size(); ++k)
         bulges[k] = mesh.positions[known + k] - middle(k);
     std::vector<int> halvings(parents.size(), 0);
-    std::vector<std::uint32_t> faces = common::self_intersecting_faces(mesh, threads);
+    common::IntersectionSearch search(mesh);
+    std::vector<std::uint32_t> faces = search.faces(threads);
     for (;;) {
         std::vector<bool> moved(mesh.positions.size(), false);
         bool news = false;
@@ -265,7 +350,8 @@ std::size_t flatten_intersections(Concealed& concealed, unsigned threads) {
             const bool before = next < faces.size() && faces[next] == f;
             if (before || moved[t[0]] || moved[t[1]] || moved[t[2]]) suspects.push_back(f);
         }
-        faces = common::self_intersecting_faces(mesh, suspects, threads);
+        search.refit();
+        faces = search.faces_with(suspects, threads);
     }
 }
 

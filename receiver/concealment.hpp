@@ -24,6 +24,15 @@ struct KnownVertex {
     double doubt = 0;        // distance from here to the coarse surface before it was wrapped
 };
 
+/// How much of their bulge edges get.
+struct Gaps {
+    /// Share of the vertices that is missing anywhere, 0 to 1: the less, the larger an edge must be
+    /// among its neighbours to bulge, for the original has the others.
+    double missing = 0;
+    /// What every edge gets, 0 to 1: where what is missing is missing everywhere.
+    double least_strength = 0;
+};
+
 struct Concealed {
     common::TriangleMesh mesh;
     /// Of guessed vertex k, at position (known vertices) + k: the ends of the edge that it split.
@@ -36,9 +45,9 @@ struct Concealed {
 /// does where it was right at the ends. Edges longer than two cells are split again. Positions of
 /// the mesh stay bit for bit and keep their places; guessed ones follow. Edges that would not bulge
 /// are not split; triangles are cut to fit: a closed manifold stays one, of the same topology.
-/// `strength` scales the bulge, 0 to 1. Cost: linear, and a search of the guide per edge.
+/// Cost: linear, and a search of the guide per edge.
 Concealed conceal(const common::TriangleMesh& mesh, std::vector<KnownVertex> vertices,
-                  const ShapeGuide& guide, double strength, unsigned threads);
+                  const ShapeGuide& guide, const Gaps& gaps, unsigned threads);
 
 /// Where triangles intersect, halves the bulge of guessed vertices, up to three times and then all
 /// of it. What intersects without a guess stays as it is. Returns how many triangles still do, as

@@ -30,39 +30,80 @@ struct Cells {
     std::vector<std::uint32_t> cell;  // of each vertex; kNoCell there
 };
 
-// Dijkstra's algorithm from all received vertices at once. They lie at 0, so that only those with
-// another kind of neighbour have to be looked at.
-Cells find_cells(const TriangleMesh& mesh, const std::vector<std::uint32_t>& received,
-                 const VertexNeighbours& neighbours) {
-    Cells cells{std::vector<double>(mesh.positions.size(), std::numeric_limits<double>::infinity()),
-                std::vector<std::uint32_t>(mesh.positions.size(), kNoCell)};
-    for (std::uint32_t k = 0; k < received.size(); ++k) {
-        cells.distance[received[k]] = 0.0;
-        cells.cell[received[k]] = k;
+// Dijkstra's algorithm from all received vertices at once. What they reach directly is most of the
+// mesh; it is sorted once, and only what is reached from there stands in a queue.
+class CellSearch {
+  public:
+    CellSearch(const TriangleMesh& mesh, const VertexNeighbours& neighbours)
+        : mesh_(mesh),
+          neighbours_(neighbours),
+          cells_{std::vector<double>(mesh.positions.size(), kUnreached),
+                 std::vector<std::uint32_t>(mesh.positions.size(), kNoCell)} {}
+
+    Cells from(const std::vector<std::uint32_t>& received) {
+        for (std::uint32_t k = 0; k < received.size(); ++k) {
+            cells_.distance[received[k]] = 0.0;
+            cells_.cell[received[k]] = k;
+        }
+        std::vector<Entry> sources;
+        sources.reserve(received.size());
+        for (const std::uint32_t v : received) sources.emplace_back(0.0, v);
+        std::vector<std::uint32_t> reached;
+        visit(sources, [&](double d, std::uint32_t u, bool first) {
+            if (!(d > 0.0)) {
+                front_.emplace(d, u);  // coincides with a received vertex
+            } else if (first) {
+                reached.push_back(u);
+            }
+        });
+        std::vector<Entry> ring;
+        ring.reserve(reached.size());
+        for (const std::uint32_t u : reached) ring.emplace_back(cells_.distance[u], u);
+        std::sort(ring.begin(), ring.end());
+        visit(ring, [&](double d, std::uint32_t u, bool) { front_.emplace(d, u); });
+        return std::move(cells_);
     }
+
+  private:
     using Entry = std::pair<double, std::uint32_t>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front;
-    for (const std::uint32_t v : received) {
-        const auto around = neighbours.of(v);
-        if (std::any_of(around.begin(), around.end(),
-                        [&](std::uint32_t u) { return cells.distance[u] > 0.0; })) {
-            front.emplace(0.0, v);
+    static constexpr double kUnreached = std::numeric_limits<double>::infinity();
+
+    // Goes through `sorted` and the queue, the nearest first. Calls enqueue(d, u, first) for a
+    // vertex u to which a shorter way was found, or the first one.
+    template <class Enqueue>
+    void visit(const std::vector<Entry>& sorted, const Enqueue& enqueue) {
+        auto next = sorted.begin();
+        while (next != sorted.end() || !front_.empty()) {
+            if (next != sorted.end() && (front_.empty() || *next < front_.top())) {
+                leave(*next++, enqueue);
+            } else {
+                const Entry nearest = front_.top();
+                front_.pop();
+                leave(nearest, enqueue);
+            }
         }
     }
-    while (!front.empty()) {
-        const auto [d, v] = front.top();
-        front.pop();
-        if (d > cells.distance[v]) continue;  // a shorter way was found meanwhile
-        for (const std::uint32_t u : neighbours.of(v)) {
-            const double through_v = d + (mesh.positions[u] - mesh.positions[v]).norm();
-            if (!(through_v < cells.distance[u])) continue;
-            cells.distance[u] = through_v;
-            cells.cell[u] = cells.cell[v];
-            front.emplace(through_v, u);
+
+    template <class Enqueue>
+    void leave(const Entry& entry, const Enqueue& enqueue) {
+        const auto [d, v] = entry;
+        if (d > cells_.distance[v]) return;  // a shorter way was found meanwhile
+        for (const std::uint32_t u : neighbours_.of(v)) {
+            const double before = cells_.distance[u];
+            if (!(d < before)) continue;
+            const double through_v = d + (mesh_.positions[u] - mesh_.positions[v]).norm();
+            if (!(through_v < before)) continue;
+            cells_.distance[u] = through_v;
+            cells_.cell[u] = cells_.cell[v];
+            enqueue(through_v, u, before == kUnreached);
         }
     }
-    return cells;
-}
+
+    const TriangleMesh& mesh_;
+    const VertexNeighbours& neighbours_;
+    Cells cells_;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front_;
+};
 
 double area_of(const TriangleMesh& mesh, const Triangle& t) {
     const Vector3d& p = mesh.positions[t[0]];
@@ -296,8 +337,9 @@ Confidence measure_confidence(const TriangleMesh& mesh, const std::vector<std::u
     assert(received.empty() || received.back() < mesh.positions.size());
     const std::size_t n = mesh.positions.size();
     const VertexNeighbours neighbours(mesh);
-    const Cells cells = find_cells(mesh, received, neighbours);
+    const Cells cells = CellSearch(mesh, neighbours).from(received);
     Confidence result;
+    result.distance.reserve(n);
     const double farthest = n > 0 ? common::bounding_box(mesh.positions).diagonal().norm() : 0.0;
     for (const double d : cells.distance) {
         result.distance.push_back(static_cast<float>(std::min(d, farthest)));

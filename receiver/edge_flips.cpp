@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
+#include <utility>
+
+#include "common/parallel.hpp"
+#include "receiver/flip_gains.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -15,8 +18,6 @@ namespace {
 constexpr double kMinTurnCosine = 0.5;
 // Delaunay within rounding: cocircular points would flip for ever.
 constexpr double kDelaunayTolerance = 1e-9;
-// Triangle quality below which a smoothing flip may not go, unless it was lower before.
-constexpr double kThinnest = 0.02;
 
 using Eigen::Vector3d;
 
@@ -43,10 +44,11 @@ bool violates_delaunay(const Corners& q) {
     const Vector3d cb = q.b - q.c;
     const Vector3d da = q.a - q.d;
     const Vector3d db = q.b - q.d;
-    const double sin_c = ca.cross(cb).norm();
-    const double sin_d = da.cross(db).norm();
     const double cos_c = ca.dot(cb);
     const double cos_d = da.dot(db);
+    if (cos_c >= 0.0 && cos_d >= 0.0) return false;  // most edges
+    const double sin_c = ca.cross(cb).norm();
+    const double sin_d = da.cross(db).norm();
     const double scale = ca.norm() * cb.norm() * da.norm() * db.norm();
     return cos_c * sin_d + cos_d * sin_c < -kDelaunayTolerance * scale;
 }
@@ -61,54 +63,17 @@ bool keeps_orientation(const Corners& q, double min_cosine) {
     return n1.dot(n_old) > limit * n1.norm() && n2.dot(n_old) > limit * n2.norm();
 }
 
-// How much a first flip may cost, in the same unit, when a second one is to make up for it.
+// How much a first flip may cost, in mean edge lengths, when a second one is to make up for it.
 constexpr double kLookAhead = 1.0;
-
-double mean_edge_length(const SurfaceMesh& mesh) {
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (FaceId f = 0; f < mesh.face_slots(); ++f) {
-        if (!mesh.face_alive(f)) continue;
-        for (unsigned corner = 0; corner < 3; ++corner) {
-            const HalfedgeId h = SurfaceMesh::halfedge(f, corner);
-            sum += (mesh.position(mesh.from_vertex(h)) - mesh.position(mesh.to_vertex(h))).norm();
-            ++count;
-        }
-    }
-    return count == 0 ? 0.0 : sum / static_cast<double>(count);
-}
-
-// What flipping h gains; minus infinity when the flip leaves a needle.
-double smoothing_gain(const SurfaceMesh& mesh, HalfedgeId h, double unit,
-                      const FlipCriterion& criterion) {
-    const HalfedgeId t = mesh.twin(h);
-    const Corners q = corners_of(mesh, h);
-    const auto settled = [&](VertexId v) { return criterion.settled[v] != 0; };
-    if (!criterion.settled.empty() && std::any_of(q.id.begin(), q.id.end(), settled)) {
-        return -std::numeric_limits<double>::infinity();
-    }
-    const double thin_now =
-        std::min(triangle_quality(q.a, q.b, q.c), triangle_quality(q.b, q.a, q.d));
-    const double thin_new =
-        std::min(triangle_quality(q.c, q.d, q.b), triangle_quality(q.d, q.c, q.a));
-    if (thin_new < std::min(kThinnest, thin_now)) return -std::numeric_limits<double>::infinity();
-    const auto outer_normal = [&](HalfedgeId side) {
-        return mesh.area_normal(SurfaceMesh::face_of(mesh.twin(side)));
-    };
-    common::Quad quad{q.a, q.b, q.c, q.d, {}, {}};
-    quad.outer_normals = {outer_normal(SurfaceMesh::next(h)), outer_normal(SurfaceMesh::prev(h)),
-                          outer_normal(SurfaceMesh::next(t)), outer_normal(SurfaceMesh::prev(t))};
-    for (std::size_t k = 0; k < 4; ++k) {
-        quad.vertex_normals[k] =
-            criterion.normals.empty() ? Vector3d::Zero().eval() : criterion.normals[q.id[k]];
-    }
-    return common::diagonal_gain(quad).weighed(criterion.weights.angle, criterion.weights.rise,
-                                               unit);
-}
 
 std::array<HalfedgeId, 4> sides_of(const SurfaceMesh& mesh, HalfedgeId h) {
     const HalfedgeId t = mesh.twin(h);
     return {SurfaceMesh::next(h), SurfaceMesh::prev(h), SurfaceMesh::next(t), SurfaceMesh::prev(t)};
+}
+
+// Half-edges that speak for their edges.
+bool stands_for_edge(const SurfaceMesh& mesh, HalfedgeId h) {
+    return mesh.face_alive(SurfaceMesh::face_of(h)) && h < mesh.twin(h);
 }
 
 // Sweeps over the edges in slot order, again over those that a flip made doubtful.
@@ -116,82 +81,115 @@ class Smoother {
   public:
     Smoother(SurfaceMesh& mesh, const FlipCriterion& criterion)
         : mesh_(mesh),
-          criterion_(criterion),
-          unit_(mean_edge_length(mesh)),
+          threads_(criterion.threads),
+          gains_(mesh, criterion),
           doubtful_(3 * mesh.face_slots()) {}
 
-    template <class Attempt>
-    std::size_t sweep(int passes, const Attempt& attempt) {
-        std::fill(doubtful_.begin(), doubtful_.end(), 1);
+    // `promising(h)` reads only, and is true of every edge on which `attempt(h)` would do anything.
+    template <class Promising, class Attempt>
+    std::size_t sweep(int passes, const Promising& promising, const Attempt& attempt) {
+        common::parallel_for(doubtful_.size(), threads_, [&](std::size_t begin, std::size_t end) {
+            for (auto h = static_cast<HalfedgeId>(begin); h < end; ++h) {
+                doubtful_[h] = stands_for_edge(mesh_, h) && promising(h);
+            }
+        });
         std::size_t flips = 0;
         for (int pass = 0; pass < passes; ++pass) {
             const std::size_t before = flips;
             for (HalfedgeId h = 0; h < doubtful_.size(); ++h) {
                 if (!doubtful_[h]) continue;
                 doubtful_[h] = 0;
-                if (mesh_.face_alive(SurfaceMesh::face_of(h)) && h < mesh_.twin(h)) {
-                    flips += attempt(h);
-                }
+                if (stands_for_edge(mesh_, h)) flips += attempt(h);
             }
             if (flips == before) break;
         }
         return flips;
     }
 
+    std::size_t sweep_single_flips(int passes) {
+        return sweep(
+            passes,
+            [&](HalfedgeId h) { return gains_.consider(h, least_gain()).gain > least_gain(); },
+            [&](HalfedgeId h) { return flip_one(h); });
+    }
+
+    std::size_t sweep_pairs_of_flips(int passes) {
+        return sweep(
+            passes,
+            [&](HalfedgeId h) { return may_pay_with_second(h, gains_.consider(h, look_ahead())); },
+            [&](HalfedgeId h) { return flip_two(h); });
+    }
+
+  private:
+    [[nodiscard]] double least_gain() const { return common::kLeastDiagonalGain * gains_.unit(); }
+
+    // What a first flip must gain, when a second one is to make up for what it lacks.
+    [[nodiscard]] double look_ahead() const { return -kLookAhead * gains_.unit(); }
+
     std::size_t flip_one(HalfedgeId h) {
-        if (!(smoothing_gain(mesh_, h, unit_, criterion_) > common::kLeastDiagonalGain * unit_) ||
-            !mesh_.can_flip(h))
-            return 0;
-        mesh_.flip(h);
-        mark(h);
+        const FlipGains::Trial trial = gains_.consider(h, least_gain());
+        if (!(trial.gain > least_gain()) || !mesh_.can_flip(h)) return 0;
+        gains_.flip(h, trial);
+        mark(h, 1);
         return 1;
+    }
+
+    // Whether flipping h, alone or with one of the edges around it, might gain enough.
+    [[nodiscard]] bool may_pay_with_second(HalfedgeId h, const FlipGains::Trial& first) const {
+        if (!(first.gain > look_ahead())) return false;
+        return first.gain > least_gain() ||
+               gains_.best_pair_gain(h, first, least_gain()) > least_gain();
     }
 
     // Flips h and then, where that helps, one of the four edges around it; neither when both
     // together do not pay. Leads out of the local minima of flip_one: a crease two triangles wide,
     // say.
     std::size_t flip_two(HalfedgeId h) {
-        const double first = smoothing_gain(mesh_, h, unit_, criterion_);
-        if (!(first > -kLookAhead * unit_) || !mesh_.can_flip(h)) return 0;
-        mesh_.flip(h);
-        HalfedgeId second = kNone;
-        double gain =
-            common::kLeastDiagonalGain * unit_ - first;  // that the second flip has to beat
-        const bool alone = gain < 0.0;
-        gain = std::max(gain, 0.0);
-        for (const HalfedgeId side : sides_of(mesh_, h)) {
-            const double here = smoothing_gain(mesh_, side, unit_, criterion_);
-            if (here > gain && mesh_.can_flip(side)) {
-                second = side;
-                gain = here;
-            }
-        }
-        if (second == kNone && !alone) {
-            mesh_.flip(h);  // back
+        const FlipGains::Trial first = gains_.consider(h, look_ahead());
+        if (!may_pay_with_second(h, first) || !mesh_.can_flip(h)) return 0;
+        gains_.flip(h, first);
+        const double missing = least_gain() - first.gain;  // for the second flip to beat
+        const auto [second, trial] = best_beside(h, std::max(missing, 0.0));
+        if (second == kNone && !(missing < 0.0)) {
+            gains_.undo(h, first);
             return 0;
         }
-        mark(h);
+        mark(h, 2);
         if (second == kNone) return 1;
-        mesh_.flip(second);
-        mark(second);
+        gains_.flip(second, trial);
+        mark(second, 2);
         return 2;
     }
 
-  private:
-    // A flip changes the gain of the edges of its two faces and of their neighbours' edges.
-    void mark(HalfedgeId h) {
+    // The edge around h whose flip gains most, if more than `gain`; kNone otherwise.
+    std::pair<HalfedgeId, FlipGains::Trial> best_beside(HalfedgeId h, double gain) const {
+        std::pair<HalfedgeId, FlipGains::Trial> best{kNone, {}};
         for (const HalfedgeId side : sides_of(mesh_, h)) {
-            const HalfedgeId beyond = mesh_.twin(side);
-            for (const HalfedgeId x :
-                 {side, SurfaceMesh::next(beyond), SurfaceMesh::prev(beyond)}) {
-                doubtful_[std::min(x, mesh_.twin(x))] = 1;
+            const FlipGains::Trial trial = gains_.consider(side, gain);
+            if (trial.gain > gain && mesh_.can_flip(side)) {
+                best = {side, trial};
+                gain = trial.gain;
             }
         }
+        return best;
+    }
+
+    // A flip changes the gain of the edges of its two faces and of their neighbours' edges, and
+    // that of pairs one face further.
+    void mark(HalfedgeId h, int faces) {
+        for (const HalfedgeId side : sides_of(mesh_, h)) mark_beyond(side, faces);
+    }
+    void mark_beyond(HalfedgeId side, int faces) {
+        const HalfedgeId beyond = mesh_.twin(side);
+        doubtful_[std::min(side, beyond)] = 1;
+        if (faces == 0) return;
+        mark_beyond(SurfaceMesh::next(beyond), faces - 1);
+        mark_beyond(SurfaceMesh::prev(beyond), faces - 1);
     }
 
     SurfaceMesh& mesh_;
-    const FlipCriterion& criterion_;
-    double unit_;
+    unsigned threads_;
+    FlipGains gains_;
     std::vector<char> doubtful_;
 };
 
@@ -219,23 +217,24 @@ std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue) 
     return flips;
 }
 
-std::size_t flip_all_to_delaunay(SurfaceMesh& mesh) {
-    std::vector<HalfedgeId> queue;
-    for (FaceId f = 0; f < mesh.face_slots(); ++f) {
-        if (!mesh.face_alive(f)) continue;
-        for (unsigned corner = 0; corner < 3; ++corner) {
-            const HalfedgeId h = SurfaceMesh::halfedge(f, corner);
-            if (h < mesh.twin(h)) queue.push_back(h);
+std::size_t flip_all_to_delaunay(SurfaceMesh& mesh, unsigned threads) {
+    std::vector<char> doubtful(3 * mesh.face_slots());
+    common::parallel_for(doubtful.size(), threads, [&](std::size_t begin, std::size_t end) {
+        for (auto h = static_cast<HalfedgeId>(begin); h < end; ++h) {
+            doubtful[h] = stands_for_edge(mesh, h) && violates_delaunay(corners_of(mesh, h));
         }
+    });
+    std::vector<HalfedgeId> queue;
+    for (HalfedgeId h = 0; h < doubtful.size(); ++h) {
+        if (doubtful[h]) queue.push_back(h);
     }
     return flip_to_delaunay(mesh, queue);
 }
 
 std::size_t flip_to_smooth(SurfaceMesh& mesh, const FlipCriterion& criterion, int passes) {
     Smoother smoother(mesh, criterion);
-    const std::size_t flips =
-        smoother.sweep(passes, [&](HalfedgeId h) { return smoother.flip_one(h); });
-    return flips + smoother.sweep(passes, [&](HalfedgeId h) { return smoother.flip_two(h); });
+    const std::size_t flips = smoother.sweep_single_flips(passes);
+    return criterion.pairs ? flips + smoother.sweep_pairs_of_flips(passes) : flips;
 }
 
 }  // namespace ellicast::receiver

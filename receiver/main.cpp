@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
     try {
         set_up_log(options);
         return static_cast<int>(run(options));
-    } catch (const std::exception& error) {  // ModelError, ListenError: the user's; else: ours
+    } catch (const std::exception& error) {  // ModelError, KeyError, ListenError: the user's
         return fail(error.what());
     }
 }

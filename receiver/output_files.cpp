@@ -12,6 +12,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "common/hex_text.hpp"
 #include "common/model_io.hpp"
 #include "receiver/vertex_colours.hpp"
 
@@ -20,8 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using common::ModelError;
-
-constexpr std::size_t kMaxStemBytes = 100;  // leaves room for suffixes below the usual 255
 
 [[noreturn]] void fail(const fs::path& path, const std::string& reason) {
     throw ModelError("cannot write '" + path.string() + "': " + reason);
@@ -107,13 +106,7 @@ common::PlyOptions result_options(const Reconstruction& reconstruction,
 }  // namespace
 
 std::string id_text(const protocol::ObjectId& id) {
-    constexpr const char* kDigits = "0123456789abcdef";
-    std::string text;
-    for (const std::uint8_t byte : id) {
-        text += kDigits[byte >> 4];
-        text += kDigits[byte & 15];
-    }
-    return text;
+    return common::hex_text(id);
 }
 
 std::string name_of(const ReceivedObject& object) {
@@ -121,12 +114,12 @@ std::string name_of(const ReceivedObject& object) {
     return id_text(object.id);
 }
 
-std::string safe_file_stem(std::string_view name) {
+std::string safe_file_stem(std::string_view name, std::size_t most_bytes) {
     const std::size_t slash = name.find_last_of("/\\");
     if (slash != std::string_view::npos) name.remove_prefix(slash + 1);
     const std::size_t start = name.find_first_not_of(".- ");
     name.remove_prefix(std::min(start, name.size()));
-    std::size_t length = std::min(name.size(), kMaxStemBytes);
+    std::size_t length = std::min(name.size(), most_bytes);
     while (length < name.size() && length > 0 && continues_character(name[length])) --length;
     std::string stem(name.substr(0, length));
     std::replace_if(stem.begin(), stem.end(), is_disliked, '_');
@@ -138,9 +131,9 @@ bool names_directory(const fs::path& output) {
     return !output.has_filename() || fs::is_directory(output, ignored);
 }
 
-fs::path output_file(const fs::path& output, const ReceivedObject& object) {
+fs::path output_file(const fs::path& output, const ReceivedObject& object, std::size_t most_bytes) {
     if (!names_directory(output)) return output;
-    std::string stem = safe_file_stem(name_of(object));
+    std::string stem = safe_file_stem(name_of(object), most_bytes);
     if (stem.empty()) stem = id_text(object.id);
     return output / (stem + ".ply");
 }

@@ -1,6 +1,7 @@
 // receiver/output_files.hpp
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -17,16 +18,17 @@ std::string id_text(const protocol::ObjectId& id);
 std::string name_of(const ReceivedObject& object);
 
 /// A file name without extension from a name that a stranger chose: its last path part, without
-/// leading dots, dashes and spaces, with '_' for what some file system dislikes, at most 100 bytes
-/// of whole UTF-8 characters. Empty when nothing is left.
-std::string safe_file_stem(std::string_view name);
+/// leading dots, dashes and spaces, with '_' for what some file system dislikes, at most so many
+/// bytes of whole UTF-8 characters. Empty when nothing is left.
+inline constexpr std::size_t kMaxStemBytes = 100;  // leaves room for suffixes below the usual 255
+std::string safe_file_stem(std::string_view name, std::size_t most_bytes = kMaxStemBytes);
 
 /// Whether the user named a directory: an existing one, or by a trailing '/'.
 bool names_directory(const std::filesystem::path& output);
 
 /// Where the mesh goes: `output` itself, or DIR/name.ply in a directory.
-std::filesystem::path output_file(const std::filesystem::path& output,
-                                  const ReceivedObject& object);
+std::filesystem::path output_file(const std::filesystem::path& output, const ReceivedObject& object,
+                                  std::size_t most_bytes = kMaxStemBytes);
 
 /// Makes sure, before anything is received, that a file can be written there; makes the directory
 /// where one is named. Throws common::ModelError with the path and the reason. Leaves an existing

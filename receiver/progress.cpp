@@ -11,7 +11,7 @@ namespace ellicast::receiver {
 std::string progress_text(const Session& session, Time now) {
     const SessionSummary summary = session.summary(now);
     const std::uint64_t malformed = summary.malformed.total();
-    const RecordStore::Group* const shown = session.store().shown();
+    const RecordStore::Group* const shown = session.shown();
     if (!shown) {
         return malformed == 0 ? "waiting" : fmt::format("waiting; {} malformed", malformed);
     }

@@ -19,6 +19,7 @@ struct ReceivedObject {
     std::vector<protocol::EllipsoidRecord> ellipsoids;
     std::vector<std::uint32_t> vertex_index;  // ascending
     std::vector<protocol::VertexRecord> vertices;
+    std::vector<protocol::EdgeRecord> edges;  // ascending; advice
 };
 
 /// Every record that the hint announces is there.

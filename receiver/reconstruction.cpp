@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "common/coarse_surface.hpp"
 #include "common/ellipsoid.hpp"
@@ -17,6 +18,8 @@
 #include "receiver/concealment.hpp"
 #include "receiver/edge_flips.hpp"
 #include "receiver/ellipsoid_mesh.hpp"
+#include "receiver/missed_shape.hpp"
+#include "receiver/object_frame.hpp"
 #include "receiver/ring_repair.hpp"
 #include "receiver/shrink_wrap.hpp"
 #include "receiver/surface_distance.hpp"
@@ -29,38 +32,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The object's frame <-> one in which the hinted box has its centre at 0 and a diagonal of 1, where
-// all tolerances live.
-struct Frame {
-    Vector3d center;
-    double diagonal;
-
-    explicit Frame(const protocol::Hint& hint) {
-        const Vector3d lo(hint.box_min[0], hint.box_min[1], hint.box_min[2]);
-        const Vector3d hi(hint.box_max[0], hint.box_max[1], hint.box_max[2]);
-        center = 0.5 * (lo + hi);
-        diagonal = (hi - lo).norm();
-    }
-    [[nodiscard]] Vector3d to_unit(const Vector3d& x) const { return (x - center) / diagonal; }
-    [[nodiscard]] Vector3d from_unit(const Vector3d& x) const { return center + diagonal * x; }
-};
-
 Vector3d position_of(const protocol::VertexRecord& record) {
     return {record.position[0], record.position[1], record.position[2]};
-}
-
-std::vector<common::Ellipsoid> unit_ellipsoids(const ReceivedObject& object, const Frame& frame) {
-    std::vector<common::Ellipsoid> result;
-    result.reserve(object.ellipsoids.size());
-    for (const protocol::EllipsoidRecord& record : object.ellipsoids) {
-        const auto& s = record.scalars;
-        common::Ellipsoid e;
-        e.center = frame.to_unit({s[0], s[1], s[2]});
-        e.L << s[3], 0, 0, s[4], s[5], 0, s[6], s[7], s[8];
-        e.L /= frame.diagonal;
-        result.push_back(e);
-    }
-    return result;
 }
 
 // One pass of the pipeline over one object; members are what the stages hand on.
@@ -101,8 +74,8 @@ class Pipeline {
     static constexpr double kConcealedReach = 4.0;
     static constexpr double kReachSlope = 8.0;
     static constexpr double kSparse = 6.0;
-    // Concealment in full from a third of the vertices lost.
-    static constexpr double kStrengthPerLoss = 3.0;
+    // Vertices further apart than this may miss what the coarse surface has.
+    static constexpr double kSparseEnough = 2.5;
 
     void stage(const char* name) const {
         if (options_.on_stage) options_.on_stage(name);
@@ -113,13 +86,10 @@ class Pipeline {
         const std::vector<common::Ellipsoid> ellipsoids = unit_ellipsoids(object_, frame_);
         if (ellipsoids.empty()) return false;
         const protocol::Hint& hint = object_.hint;
-        const Vector3d lo(hint.box_min[0], hint.box_min[1], hint.box_min[2]);
-        const Vector3d hi(hint.box_max[0], hint.box_max[1], hint.box_max[2]);
         const common::PromisedTopology promise{hint.components, hint.euler_all, hint.euler_largest};
         const std::vector<Vector3d> normals = tagged_normals();
-        coarse_ = common::make_coarse_surface(
-            {ellipsoids, points_, normals, {frame_.to_unit(lo), frame_.to_unit(hi)}}, promise,
-            options_.grid, options_.threads);
+        coarse_ = common::make_coarse_surface({ellipsoids, points_, normals, frame_.unit_box(hint)},
+                                              promise, options_.grid, options_.threads);
         if (coarse_ && options_.keep_stages) {
             stages_.ellipsoids = to_model_frame(mesh_of(ellipsoids));
             stages_.marching_cubes = to_model_frame(coarse_->mesh);
@@ -158,27 +128,115 @@ class Pipeline {
     // triangulation. Where every vertex arrived, `whole`, no marching-cubes vertex has a place in
     // the result.
     void settle(bool whole) {
+        std::vector<bool> needed(surface_.mesh.vertex_slots(), false);
+        if (!whole) {
+            const double spacing = spacing_cells();
+            needed = needed_coarse_vertices(spacing);
+            if (conceals() && spacing > kSparseEnough) keep_what_is_missed(needed);
+        }
+        settle_with(needed);
+    }
+
+    void settle_with(const std::vector<bool>& needed) {
         stage("remove");
-        const std::vector<bool> needed =
-            whole ? std::vector<bool>(surface_.mesh.vertex_slots(), false)
-                  : needed_coarse_vertices();
         remove_vertices(surface_.mesh, [&](VertexId v) {
             return surface_.point_of_vertex[v] == kNone && !needed[v];
         });
         stage("shift");
         shift_to_points(surface_, points_);
         stage("flip");
-        flip_all_to_delaunay(surface_.mesh);
+        flip_all_to_delaunay(surface_.mesh, options_.threads);
+        fix_edges();
         smooth({});
+    }
+
+    // Tries what received vertices alone would give. Coarse vertices that this misses stay, too.
+    void keep_what_is_missed(std::vector<bool>& needed) {
+        const PointSurface before = surface_;
+        settle_with(needed);
+        Extracted trial = extract();
+        const common::TriangleMesh mesh = trial.mesh;
+        std::vector<double> doubts = doubts_at(mesh.positions);
+        conceal_missing(trial, doubts);
+        surface_ = before;
+        for (std::size_t v = 0; v < doubts.size(); ++v) {
+            if (trial.point[v] == kNone) doubts[v] = -1.0;
+        }
+        const MissedShape missed(mesh, doubts, trial.mesh);
+        std::vector<char> misses(needed.size(), 0);
+        common::parallel_for(
+            misses.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+                for (auto v = static_cast<VertexId>(begin); v < end; ++v) {
+                    if (!surface_.mesh.vertex_alive(v) || surface_.point_of_vertex[v] != kNone) {
+                        continue;
+                    }
+                    misses[v] = static_cast<char>(missed.at(surface_.mesh.position(v)));
+                }
+            });
+        for (VertexId v = 0; v < needed.size(); ++v) {
+            if (misses[v] != 0) needed[v] = true;
+        }
+    }
+
+    // Edges that the sender names, between vertices that are there.
+    void fix_edges() {
+        fixed_ = FixedEdges(surface_.mesh.vertex_slots());
+        if (object_.edges.empty() || points_.empty()) return;
+        std::vector<VertexId> slot_of(points_.size(), kNone);
+        for (VertexId v = 0; v < surface_.mesh.vertex_slots(); ++v) {
+            const std::uint32_t point = surface_.point_of_vertex[v];
+            if (point != kNone && surface_.mesh.vertex_alive(v)) slot_of[point] = v;
+        }
+        const std::uint32_t span = 1 + object_.vertex_index.back();
+        const auto slot = [&](std::uint32_t index) {
+            const auto place =
+                std::lower_bound(object_.vertex_index.begin(), object_.vertex_index.end(), index);
+            if (place == object_.vertex_index.end() || *place != index) return kNone;
+            return slot_of[static_cast<std::size_t>(place - object_.vertex_index.begin())];
+        };
+        for (const protocol::EdgeRecord& edge : object_.edges) {
+            if (span > edge.among) continue;
+            const VertexId a = slot(edge.a);
+            const VertexId b = slot(edge.b);
+            if (a == kNone || b == kNone) continue;
+            if (insert_edge(surface_.mesh, a, b, fixed_)) fixed_.add(a, b);
+        }
     }
 
     // Rings that are `settled` stay.
     void smooth(std::span<const char> settled) {
         const common::DiagonalWeights weights =
             common::diagonal_weights(object_.hint.diagonals, has_normals(), loss());
-        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle}, .settled = settled});
+        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle},
+                                       .settled = settled,
+                                       .fixed = &fixed_,
+                                       .pairs = false,
+                                       .threads = options_.threads});
         const std::vector<Vector3d> normals = guiding_normals();
-        flip_to_smooth(surface_.mesh, {.normals = normals, .weights = weights, .settled = settled});
+        FlipCriterion criterion{.normals = normals,
+                                .weights = weights,
+                                .settled = settled,
+                                .fixed = &fixed_,
+                                .threads = options_.threads};
+        flip_to_smooth(surface_.mesh, criterion);
+        if (!(weights.mark > common::kLeastDiagonalGain)) return;
+        // Marks tell what the rule gets wrong of a mesh that is right otherwise; before it is
+        // nearly so, they lead astray.
+        const std::vector<char> marks = marked_vertices();
+        criterion.marks = marks;
+        flip_to_smooth(surface_.mesh, criterion);
+    }
+
+    // Per vertex slot. Requires tags.
+    [[nodiscard]] std::vector<char> marked_vertices() const {
+        std::vector<char> marks(surface_.mesh.vertex_slots(), 0);
+        for (VertexId v = 0; v < marks.size(); ++v) {
+            const std::uint32_t point = surface_.point_of_vertex[v];
+            if (point == kNone) continue;
+            marks[v] = static_cast<char>(
+                common::is_marked(object_.vertices[point].normal, object_.hint.format.normal_bits));
+        }
+        return marks;
     }
 
     // Of vertices; the one loss that geometry knows of (DESIGN section 1).
@@ -200,7 +258,7 @@ class Pipeline {
         }
         if (points_.size() < object_.hint.vertices) return mend_lossy(witnesses);
         SurfaceMesh other = surface_.mesh;
-        flip_all_to_delaunay(other);
+        flip_all_to_delaunay(other, options_.threads);
         if (ring_agreement(other, witnesses).agree > ring_agreement(surface_.mesh, witnesses).agree)
             std::swap(other, surface_.mesh);
         rings_ = repair_rings(surface_.mesh, witnesses);
@@ -214,7 +272,7 @@ class Pipeline {
 
     // Rings that agree stay; the rest is mended anew around them.
     void mend_lossy(const std::vector<RingWitness>& witnesses) {
-        flip_all_to_delaunay(surface_.mesh);
+        flip_all_to_delaunay(surface_.mesh, options_.threads);
         repair_rings(surface_.mesh, witnesses, true);
         smooth(settled_rings(surface_.mesh, witnesses));
         rings_ = ring_agreement(surface_.mesh, witnesses);
@@ -248,8 +306,8 @@ class Pipeline {
 
     [[nodiscard]] std::vector<Vector3d> guiding_normals() const {
         std::vector<VertexId> slots;
-        const common::TriangleMesh mesh = surface_.mesh.extract(&slots);
-        const std::vector<Vector3d> estimates = common::vertex_normals(mesh);
+        const std::vector<Vector3d> estimates =
+            common::vertex_normals(surface_.mesh.extract(&slots));
         std::vector<Vector3d> normals(surface_.mesh.vertex_slots(), Vector3d::Zero());
         for (std::size_t i = 0; i < slots.size(); ++i) {
             normals[slots[i]] = normal_at(surface_.point_of_vertex[slots[i]], estimates[i], 0.0);
@@ -257,15 +315,18 @@ class Pipeline {
         return normals;
     }
 
-    // Where vertices lie closer than kSparse cells, concealment knows better than marching-cubes
-    // vertices do; they go out to a distance that falls to kLeastReach beyond.
-    [[nodiscard]] double reach_cells() const {
+    // Between received vertices, were they even.
+    [[nodiscard]] double spacing_cells() const {
         double area = 0.0;
         for (FaceId f = 0; f < surface_.mesh.face_slots(); ++f) {
             if (surface_.mesh.face_alive(f)) area += 0.5 * surface_.mesh.area_normal(f).norm();
         }
-        const double spacing =
-            std::sqrt(area / static_cast<double>(points_.size())) / coarse_->cell;
+        return std::sqrt(area / static_cast<double>(points_.size())) / coarse_->cell;
+    }
+
+    // Where vertices lie closer than kSparse cells, concealment knows better than marching-cubes
+    // vertices do; they go out to a distance that falls to kLeastReach beyond.
+    [[nodiscard]] double reach_cells(double spacing) const {
         if (!options_.conceal) {
             return std::clamp(kMostReach + 1.0 - spacing, kLeastReach, kMostReach);
         }
@@ -274,14 +335,14 @@ class Pipeline {
 
     // Marching-cubes vertices with no received vertex within reach along the surface: there they
     // are all that tells the shape, and they tell it better than triangles across the gap would.
-    [[nodiscard]] std::vector<bool> needed_coarse_vertices() const {
+    [[nodiscard]] std::vector<bool> needed_coarse_vertices(double spacing) const {
         std::vector<VertexId> received;
         for (VertexId v = 0; v < surface_.mesh.vertex_slots(); ++v) {
             if (surface_.mesh.vertex_alive(v) && surface_.point_of_vertex[v] != kNone) {
                 received.push_back(v);
             }
         }
-        const double reach = reach_cells() * coarse_->cell;
+        const double reach = reach_cells(spacing) * coarse_->cell;
         const std::vector<double> distance = distance_along_edges(surface_.mesh, received, reach);
         std::vector<bool> needed(distance.size());
         for (VertexId v = 0; v < needed.size(); ++v) needed[v] = distance[v] > reach;
@@ -302,28 +363,44 @@ class Pipeline {
         }
         std::vector<VertexId> slots;
         result.mesh = surface_.mesh.extract(&slots);
+        result.point.reserve(slots.size());
         for (const VertexId v : slots) result.point.push_back(surface_.point_of_vertex[v]);
+        surface_ = {};  // as large as all that follows
         return result;
     }
 
-    // Full from a third of the vertices lost. Those that only the end of an order by importance
-    // would bring are missed less. Prefix of half the vertices, rms with and without this, in 1e-4:
-    // spot 3.4 4.9, rocker-arm 1.8 2.2, bunny 1.7 2.0.
-    [[nodiscard]] double concealment_strength() const {
-        if (!object_.hint.by_importance) return std::min(1.0, kStrengthPerLoss * loss());
+    // Vertices that only the end of an order by importance would bring are missed everywhere, and
+    // less. Prefix of half the vertices, rms with this strength and with that of as many lost at
+    // random, in 1e-4: spot 3.4 4.9, rocker-arm 1.8 2.2, bunny 1.7 2.0.
+    [[nodiscard]] Gaps gaps() const {
+        if (!object_.hint.by_importance) return {loss(), 0.0};
         const double span = 1.0 + object_.vertex_index.back();
         const double lost = 1.0 - static_cast<double>(points_.size()) / span;
         const double to_come = 1.0 - span / static_cast<double>(object_.hint.vertices);
-        return std::min(1.0, std::max(kStrengthPerLoss * lost, to_come * to_come));
+        return {lost, to_come * to_come};
     }
 
-    // DESIGN section 7, in full from a third of the vertices lost.
-    void conceal_missing(Extracted& extracted) const {
-        if (!options_.conceal || points_.empty()) return;
-        if (!(loss() > 0.0)) return;
+    // What wrapping had to move the coarse surface by, or would have had to.
+    [[nodiscard]] std::vector<double> doubts_at(const std::vector<Vector3d>& positions) const {
+        const common::TriangleTree unwrapped(unwrapped_);
+        std::vector<double> doubts(positions.size());
+        common::parallel_for(
+            doubts.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t v = begin; v < end; ++v) {
+                    doubts[v] = std::sqrt(unwrapped.closest(positions[v]).squared_distance);
+                }
+            });
+        return doubts;
+    }
+
+    [[nodiscard]] bool conceals() const {
+        return options_.conceal && !points_.empty() && loss() > 0.0;
+    }
+
+    // DESIGN section 7. `doubts` are those at the positions of the mesh.
+    void conceal_missing(Extracted& extracted, const std::vector<double>& doubts) const {
         stage("conceal");
         const std::vector<Vector3d> estimates = common::vertex_normals(extracted.mesh);
-        const common::TriangleTree unwrapped(unwrapped_);
         const common::TriangleTree wrapped(coarse_->mesh);
         const double doubt =
             has_normals() ? 0.5 * common::normal_cell_angle(object_.hint.format.normal_bits) : 0.0;
@@ -331,13 +408,11 @@ class Pipeline {
         common::parallel_for(
             known.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t v = begin; v < end; ++v) {
-                    known[v].normal = normal_at(extracted.point[v], estimates[v], doubt);
-                    known[v].doubt =
-                        std::sqrt(unwrapped.closest(extracted.mesh.positions[v]).squared_distance);
+                    known[v] = {normal_at(extracted.point[v], estimates[v], doubt), doubts[v]};
                 }
             });
         Concealed concealed = conceal(extracted.mesh, std::move(known), {&wrapped, coarse_->cell},
-                                      concealment_strength(), options_.threads);
+                                      gaps(), options_.threads);
         flatten_intersections(concealed, options_.threads);
         extracted.mesh = std::move(concealed.mesh);
         extracted.point.resize(extracted.mesh.positions.size(), kNone);
@@ -350,8 +425,11 @@ class Pipeline {
         Reconstruction result;
         Extracted extracted = extract();
         const std::size_t unguessed = extracted.point.size();
-        conceal_missing(extracted);
-        result.mesh = to_model_frame(extracted.mesh);
+        if (conceals()) conceal_missing(extracted, doubts_at(extracted.mesh.positions));
+        points_ = std::vector<Vector3d>();  // not asked for any more, and room for what follows
+        result.mesh = to_model_frame(std::move(extracted.mesh));
+        result.provenance.reserve(extracted.point.size());
+        result.vertex_index.reserve(extracted.point.size());
         for (std::size_t i = 0; i < extracted.point.size(); ++i) {
             const std::uint32_t point = extracted.point[i];
             result.provenance.push_back(point != kNone  ? Provenance::received
@@ -383,7 +461,7 @@ class Pipeline {
             if (result.vertex_index[v] != kNotReceived) received.push_back(v);
         }
         const std::size_t expected = object_.hint.vertices;
-        const std::size_t missing = expected - std::min(expected, points_.size());
+        const std::size_t missing = expected - std::min(expected, object_.vertices.size());
         result.confidence = measure_confidence(result.mesh, received, missing, options_.threads);
         const auto& lo = object_.hint.box_min;
         const auto& hi = object_.hint.box_max;
@@ -398,10 +476,7 @@ class Pipeline {
                topology.euler == hint.euler_all && topology.euler_largest == hint.euler_largest;
     }
 
-    [[nodiscard]] Vector3d origin() const {
-        if (!object_.description) return Vector3d::Zero();
-        return Eigen::Map<const Vector3d>(object_.description->origin.data());
-    }
+    [[nodiscard]] Vector3d origin() const { return origin_of(object_); }
 
     [[nodiscard]] common::TriangleMesh to_model_frame(common::TriangleMesh mesh) const {
         for (Vector3d& p : mesh.positions) p = origin() + frame_.from_unit(p);
@@ -410,12 +485,13 @@ class Pipeline {
 
     const ReceivedObject& object_;
     const ReconstructionOptions& options_;
-    Frame frame_;
+    ObjectFrame frame_;
     std::vector<Vector3d> points_;
     std::optional<common::CoarseSurface> coarse_;
     common::TriangleMesh unwrapped_;
     PointSurface surface_;
     std::vector<std::uint32_t> left_out_;
+    FixedEdges fixed_;
     std::optional<RingAgreement> rings_;
     Stages stages_;
 };

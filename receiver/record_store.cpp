@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <chrono>
 #include <tuple>
 #include <utility>
@@ -19,16 +20,22 @@ using Group = RecordStore::Group;
 // any pause of a sender that still lives, short for whoever waits for its restart.
 constexpr Time kSilence = std::chrono::seconds(5);
 
+// A verified key is one sender, whatever address and session it comes with.
+bool is_owner(const Group& group, const SenderKey& sender) {
+    const Authenticity& said = sender.source.authenticity;
+    return said.verified() ? group.sender.source.authenticity.key == said.key
+                           : group.sender == sender;
+}
+
 bool holds(const Group& group, const SenderKey& sender, const protocol::DatagramHeader& header,
            const std::array<std::uint8_t, protocol::kCanonicalHintBytes>& hint_bytes) {
-    return group.sender == sender && group.object == header.object &&
+    return is_owner(group, sender) && group.object == header.object &&
            group.hint_bytes == hint_bytes;
 }
 
-// Sent by one host, and the same object.
+// Sent by one station, and the same object.
 bool akin(const Group& a, const Group& b) {
-    return a.sender.source.address == b.sender.source.address && a.object == b.object &&
-           a.hint_bytes == b.hint_bytes;
+    return same_station(a.sender, b.sender) && a.object == b.object && a.hint_bytes == b.hint_bytes;
 }
 
 auto order_of(const Group& group) {
@@ -45,6 +52,22 @@ void keep_smaller(std::optional<protocol::Description>& kept, protocol::Descript
     if (!kept || order_of(other) < order_of(*kept)) kept = std::move(other);
 }
 
+/// Decodes a section's records, some at a time, into a table.
+template <class Record>
+InsertionCounts insert_all(RecordTable<Record>& table, const protocol::SectionView& section,
+                           MemoryBudget& budget) {
+    InsertionCounts counts;
+    std::array<Record, 64> block;
+    for (std::size_t k = 0; k < section.count; k += block.size()) {
+        const std::size_t size = std::min(block.size(), section.count - k);
+        const auto records = std::span(block).first(size);
+        section.read(k, records);
+        counts += table.insert_run(section.index(k), section.stride,
+                                   std::span<const Record>(records), budget);
+    }
+    return counts;
+}
+
 void add_sender(std::vector<SenderKey>& senders, const SenderKey& sender) {
     if (senders.size() >= RecordStore::kMaxSenders) return;
     if (std::find(senders.begin(), senders.end(), sender) == senders.end()) {
@@ -52,7 +75,20 @@ void add_sender(std::vector<SenderKey>& senders, const SenderKey& sender) {
     }
 }
 
+// Another run of the sender, or another way to us: its rounds are its own.
+void change_sender(Group& group, const SenderKey& sender) {
+    if (group.sender.session != sender.session) group.progress = {};
+    group.sender = sender;
+    add_sender(group.senders, sender);
+}
+
 }  // namespace
+
+bool same_station(const SenderKey& a, const SenderKey& b) {
+    const Authenticity& key = a.source.authenticity;
+    if (key.key != b.source.authenticity.key) return false;
+    return key.verified() || a.source.address == b.source.address;
+}
 
 RecordStore::RecordStore(const StoreLimits& limits) : limits_(limits), budget_(limits.bytes) {
     limits_.groups = std::max<std::size_t>(limits_.groups, 1);
@@ -66,10 +102,16 @@ bool RecordStore::accept(Time now, const SenderKey& sender,
     }
     latest_ = group_of(sender, datagram.header);
     Group& group = groups_[latest_];
+    if (group.sender != sender) change_sender(group, sender);
     group.last_seen = now;
     ++group.datagrams;
     group.progress.on_header(now, datagram.header);
+    const bool was_complete = group.complete();
+    const bool was_described = group.description.has_value();
     for (const protocol::SectionView& section : datagram.sections()) take_section(group, section);
+    if (group.complete() != was_complete || group.description.has_value() != was_described) {
+        ++changes_;
+    }
 
     for (std::size_t k = groups_.size(); k-- > 0 && groups_.size() > 1;) {
         const Group& other = groups_[k];
@@ -116,31 +158,35 @@ std::size_t RecordStore::add_group(const SenderKey& sender,
               .progress = {},
               .description = std::nullopt,
               .ellipsoids = RecordTable<protocol::EllipsoidRecord>(header.hint.ellipsoids),
-              .vertices = RecordTable<protocol::VertexRecord>(header.hint.vertices)});
+              .vertices = RecordTable<protocol::VertexRecord>(header.hint.vertices),
+              .edges = EdgeSet(header.hint.vertices)});
+    ++changes_;
     return groups_.size() - 1;
 }
 
 void RecordStore::take_section(Group& group, const protocol::SectionView& section) {
+    const auto count = [&](const InsertionCounts& counts) {
+        counts_.repeated += counts.same;
+        counts_.refused += counts.refused;
+    };
     switch (section.kind) {
         case protocol::SectionKind::ellipsoids:
-            for (std::size_t k = 0; k < section.count; ++k) {
-                count(group.ellipsoids.insert(section.index(k), section.ellipsoid(k), budget_));
-            }
+            count(insert_all(group.ellipsoids, section, budget_));
             break;
         case protocol::SectionKind::vertices:
+            count(insert_all(group.vertices, section, budget_));
+            break;
+        case protocol::SectionKind::edges:
             for (std::size_t k = 0; k < section.count; ++k) {
-                count(group.vertices.insert(section.index(k), section.vertex(k), budget_));
+                if (!group.edges.insert(section.edge(k), budget_)) ++counts_.refused;
             }
             break;
         case protocol::SectionKind::description:
             keep_smaller(group.description, section.description());
             break;
+        case protocol::SectionKind::page:  // receiver/catalogue.hpp
+            break;
     }
-}
-
-void RecordStore::count(Insertion outcome) {
-    if (outcome == Insertion::same) ++counts_.repeated;
-    if (outcome == Insertion::refused) ++counts_.refused;
 }
 
 void RecordStore::merge_silent(Time now) {
@@ -169,22 +215,35 @@ void RecordStore::merge_into(Group& newer, Group& older) {
     };
     unite(newer.ellipsoids, older.ellipsoids);
     unite(newer.vertices, older.vertices);
+    unite(newer.edges, older.edges);
     if (older.description) keep_smaller(newer.description, *std::move(older.description));
     for (const SenderKey& sender : older.senders) add_sender(newer.senders, sender);
     newer.datagrams += older.datagrams;
+    ++changes_;
     ++counts_.merged;
 }
 
 void RecordStore::remove(std::size_t group) {
     groups_[group].ellipsoids.release(budget_);
     groups_[group].vertices.release(budget_);
+    groups_[group].edges.release(budget_);
     groups_.erase(groups_.begin() + static_cast<std::ptrdiff_t>(group));
-    if (latest_ > group) --latest_;
+    if (latest_ == group) {
+        latest_ = groups_.size();  // none
+    } else if (latest_ > group) {
+        --latest_;
+    }
 }
 
 const RecordStore::Group* RecordStore::shown() const {
+    return greatest([](const Group&) { return true; });
+}
+
+const RecordStore::Group* RecordStore::greatest(
+    const std::function<bool(const Group&)>& counts) const {
     const Group* best = nullptr;
     for (const Group& group : groups_) {
+        if (!counts(group)) continue;
         if (!best || group.records() > best->records() ||
             (group.records() == best->records() && order_of(group) < order_of(*best))) {
             best = &group;
@@ -193,12 +252,21 @@ const RecordStore::Group* RecordStore::shown() const {
     return best;
 }
 
+const RecordStore::Group* RecordStore::latest() const {
+    return latest_ < groups_.size() ? &groups_[latest_] : nullptr;
+}
+
+void RecordStore::forget(const Group& group) {
+    assert(&group >= groups_.data() && &group < groups_.data() + groups_.size());
+    remove(static_cast<std::size_t>(&group - groups_.data()));
+}
+
 std::optional<Time> RecordStore::last_heard() const {
     const Group* const best = shown();
     if (!best) return std::nullopt;
     Time latest = best->last_seen;
     for (const Group& group : groups_) {
-        if (group.sender.source.address == best->sender.source.address) {
+        if (same_station(group.sender, best->sender)) {
             latest = std::max(latest, group.last_seen);
         }
     }
@@ -208,10 +276,14 @@ std::optional<Time> RecordStore::last_heard() const {
 std::optional<ReceivedObject> RecordStore::snapshot() const {
     const Group* const group = shown();
     if (!group) return std::nullopt;
+    return snapshot_of(*group);
+}
+
+ReceivedObject RecordStore::snapshot_of(const Group& group) {
     ReceivedObject object;
-    object.id = group->object;
-    object.hint = group->hint;
-    object.description = group->description;
+    object.id = group.object;
+    object.hint = group.hint;
+    object.description = group.description;
     const auto copy = [](const auto& table, auto& indices, auto& records) {
         indices.reserve(table.size());
         records.reserve(table.size());
@@ -220,8 +292,9 @@ std::optional<ReceivedObject> RecordStore::snapshot() const {
             records.push_back(record);
         });
     };
-    copy(group->ellipsoids, object.ellipsoid_index, object.ellipsoids);
-    copy(group->vertices, object.vertex_index, object.vertices);
+    copy(group.ellipsoids, object.ellipsoid_index, object.ellipsoids);
+    copy(group.vertices, object.vertex_index, object.vertices);
+    object.edges.assign(group.edges.edges().begin(), group.edges.edges().end());
     return object;
 }
 

@@ -4,11 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "protocol/datagram.hpp"
 #include "receiver/arrival.hpp"
+#include "receiver/edge_set.hpp"
 #include "receiver/received_object.hpp"
 #include "receiver/record_table.hpp"
 #include "receiver/round_progress.hpp"
@@ -31,6 +33,11 @@ struct SenderKey {
     auto operator<=>(const SenderKey&) const = default;
 };
 
+/// Whether two senders are one station, so that one may go on with what the other began, and send
+/// other versions of its pages: with keys the same verified key, without them the same source
+/// address.
+bool same_station(const SenderKey& a, const SenderKey& b);
+
 struct StoreCounts {
     std::uint64_t repeated = 0;    // records that were there already, bit for bit
     std::uint64_t refused = 0;     // records for which no memory was left
@@ -39,13 +46,13 @@ struct StoreCounts {
     std::uint64_t merged = 0;      // groups united with a later one
 };
 
-/// Keeps records by who sent what (DESIGN section 5, "Who belongs together"): a group per source
-/// address and port, session, object id and hint. Groups never contribute to one another, but a
-/// group that was silent for 5 s is united with a later one from the same address with the same
-/// object id and hint: the restarted sender. The content of a group is a function of the set of its
-/// accepted records (RecordTable). Memory is bounded by the limits: when there are too many groups
-/// a lesser one goes (entry_to_evict); when there are too many bytes, new records are refused.
-/// Pure: time is an argument.
+/// Keeps records by who sent what (DESIGN section 5, "Who belongs together"): a group per verified
+/// key, or else source address, port and session, and object id and hint. Groups never contribute
+/// to one another, but a group without a key that was silent for 5 s is united with a later one
+/// from the same address with the same object id and hint: the restarted sender. The content of a
+/// group is a function of the set of its accepted records (RecordTable). Memory is bounded by the
+/// limits: when there are too many groups a lesser one goes (entry_to_evict); when there are too
+/// many bytes, new records are refused. Pure: time is an argument.
 class RecordStore {
   public:
     explicit RecordStore(const StoreLimits& limits = {});
@@ -72,6 +79,7 @@ class RecordStore {
         std::optional<protocol::Description> description;
         RecordTable<protocol::EllipsoidRecord> ellipsoids;
         RecordTable<protocol::VertexRecord> vertices;
+        EdgeSet edges;  // advice: no records, they neither complete nor show a group
 
         [[nodiscard]] std::size_t records() const { return ellipsoids.size() + vertices.size(); }
         [[nodiscard]] bool complete() const { return ellipsoids.complete() && vertices.complete(); }
@@ -81,27 +89,37 @@ class RecordStore {
     /// The group with the most distinct records, ties by the smaller hint digest, then object id
     /// and sender. Null before anything was accepted.
     [[nodiscard]] const Group* shown() const;
+    /// The same among the groups for which `counts` is true.
+    [[nodiscard]] const Group* greatest(const std::function<bool(const Group&)>& counts) const;
+    /// The group of the last datagram accepted; null before.
+    [[nodiscard]] const Group* latest() const;
+    /// Goes up whenever a group comes, becomes complete, or its name known.
+    [[nodiscard]] std::uint64_t changes() const { return changes_; }
+    /// Gives a group up, with all its records. Requires one of groups() (asserted).
+    void forget(const Group& group);
     [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
     [[nodiscard]] std::size_t bytes() const { return budget_.used(); }
     [[nodiscard]] const StoreCounts& counts() const { return counts_; }
 
-    /// When any group from the shown group's address (without its port) last sent something valid.
+    /// When any group of the shown group's station last sent something valid.
     [[nodiscard]] std::optional<Time> last_heard() const;
 
     /// The shown group as a value; empty before anything was accepted. Linear in its records.
     [[nodiscard]] std::optional<ReceivedObject> snapshot() const;
+    /// The same of any group.
+    static ReceivedObject snapshot_of(const Group& group);
 
   private:
     std::size_t group_of(const SenderKey& sender, const protocol::DatagramHeader& header);
     std::size_t add_group(const SenderKey& sender, const protocol::DatagramHeader& header);
     void take_section(Group& group, const protocol::SectionView& section);
-    void count(Insertion outcome);
     void merge_into(Group& newer, Group& older);
     void remove(std::size_t group);
 
     StoreLimits limits_;
     MemoryBudget budget_;
     StoreCounts counts_;
+    std::uint64_t changes_ = 0;
     std::vector<Group> groups_;  // in order of arrival
     std::size_t latest_ = 0;     // index of the group of the last datagram
 };

@@ -1,12 +1,15 @@
 // receiver/record_table.hpp
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -50,6 +53,15 @@ inline std::array<std::uint32_t, 5> order_of(const protocol::VertexRecord& recor
             std::uint32_t{red} << 16 | std::uint32_t{green} << 8 | blue};
 }
 
+/// Whether the records are the same, bit for bit. Requires as many of both (asserted).
+template <class Record>
+bool same_bits(std::span<const Record> a, std::span<const Record> b) {
+    assert(a.size() == b.size());
+    return std::memcmp(std::as_bytes(a).data(), std::as_bytes(b).data(), a.size_bytes()) == 0;
+}
+// Without padding, so that equal records have equal bytes.
+static_assert(sizeof(protocol::EllipsoidRecord) == 36 && sizeof(protocol::VertexRecord) == 20);
+
 enum class Insertion {
     fresh,        // the index was not there
     same,         // it was, with the same bits
@@ -57,11 +69,27 @@ enum class Insertion {
     refused       // no memory left for it; nothing changed
 };
 
+/// What became of several records.
+struct InsertionCounts {
+    std::size_t same = 0;
+    std::size_t refused = 0;
+
+    void add(Insertion outcome) {
+        same += outcome == Insertion::same ? 1 : 0;
+        refused += outcome == Insertion::refused ? 1 : 0;
+    }
+    InsertionCounts& operator+=(const InsertionCounts& other) {
+        same += other.same;
+        refused += other.refused;
+        return *this;
+    }
+};
+
 /// The records of one kind of one object by index. Content and disputes are functions of the set of
 /// (index, record) pairs inserted, in whatever order and however often: of several records with one
 /// index the bytewise smallest big-endian form is kept. Memory follows what arrived, not what a
-/// hint claims: an ordered map until one index in 16 is there, a flat array from then on. So a
-/// received record costs at most about 16 records' bytes.
+/// hint claims: an ordered map of chunks of eight until one index in 16 is there, a flat array from
+/// then on. So a received record costs at most about 16 records' bytes.
 template <class Record>
 class RecordTable {
   public:
@@ -69,6 +97,11 @@ class RecordTable {
 
     /// Requires index < expected (asserted). Logarithmic while sparse, constant when dense.
     Insertion insert(std::uint32_t index, const Record& record, MemoryBudget& budget);
+
+    /// The same for records with indices first, first + stride, ..., all of them below expected
+    /// (asserted). Neighbours that are all new to a dense table, or all known to it, go in at once.
+    InsertionCounts insert_run(std::uint32_t first, std::uint32_t stride,
+                               std::span<const Record> records, MemoryBudget& budget);
 
     /// Inserts all of `other`, disputes too. False when memory ran out on the way.
     bool merge(const RecordTable& other, MemoryBudget& budget);
@@ -90,13 +123,16 @@ class RecordTable {
     }
 
   private:
-    struct Entry {
-        Record record;
-        bool disputed = false;
+    // Neighbours, which mostly come together. Few, for a lonely record takes the room of all.
+    struct Chunk {
+        std::array<Record, 8> records{};
+        std::uint8_t present = 0;  // bit k: record k
+        std::uint8_t disputed = 0;
     };
+    static constexpr std::uint32_t kChunk = 8;
     static constexpr std::size_t kDenseShare = 16;
     // A red-black node: three pointers and a colour, the pair, and the allocator's own 16 bytes.
-    static constexpr std::size_t kSparseBytes = 48 + sizeof(std::pair<const std::uint32_t, Entry>);
+    static constexpr std::size_t kChunkBytes = 48 + sizeof(std::pair<const std::uint32_t, Chunk>);
 
     static std::uint64_t bit(std::uint32_t index) { return std::uint64_t{1} << (index % 64); }
     [[nodiscard]] std::size_t words() const { return (std::size_t{expected_} + 63) / 64; }
@@ -105,8 +141,17 @@ class RecordTable {
     }
     [[nodiscard]] bool is_dense() const { return !dense_.empty(); }
 
-    Insertion insert_sparse(std::uint32_t index, const Record& record, MemoryBudget& budget);
+    static std::uint8_t chunk_bit(std::uint32_t index) {
+        return static_cast<std::uint8_t>(1u << index % kChunk);
+    }
+
+    Insertion insert_one(std::uint32_t index, const Record& record, MemoryBudget& budget,
+                         Chunk*& latest);
+    Insertion insert_sparse(std::uint32_t index, const Record& record, Chunk& chunk);
+    Chunk* chunk_of(std::uint32_t index, MemoryBudget& budget);
     Insertion insert_dense(std::uint32_t index, const Record& record);
+    bool insert_together(std::uint32_t first, std::span<const Record> records,
+                         InsertionCounts& counts);
     void densify(MemoryBudget& budget);
     void dispute(std::uint32_t index);
 
@@ -117,8 +162,8 @@ class RecordTable {
     std::size_t size_ = 0;
     std::size_t disputed_count_ = 0;
     std::size_t bytes_ = 0;
-    std::map<std::uint32_t, Entry> sparse_;
-    std::vector<Record> dense_;  // by index, when dense
+    std::map<std::uint32_t, Chunk> sparse_;  // by index / kChunk
+    std::vector<Record> dense_;              // by index, when dense
     std::vector<std::uint64_t> present_;
     std::vector<std::uint64_t> disputed_;
 };
@@ -126,27 +171,91 @@ class RecordTable {
 template <class Record>
 Insertion RecordTable<Record>::insert(std::uint32_t index, const Record& record,
                                       MemoryBudget& budget) {
+    Chunk* none = nullptr;
+    return insert_one(index, record, budget, none);
+}
+
+template <class Record>
+InsertionCounts RecordTable<Record>::insert_run(std::uint32_t first, std::uint32_t stride,
+                                                std::span<const Record> records,
+                                                MemoryBudget& budget) {
+    InsertionCounts counts;
+    Chunk* latest = nullptr;
+    while (!records.empty()) {
+        // As many as one word of bits speaks of.
+        const std::size_t block =
+            stride == 1 ? std::min<std::size_t>(records.size(), 64 - first % 64) : records.size();
+        const auto now = records.first(block);
+        if (stride != 1 || !is_dense() || !insert_together(first, now, counts)) {
+            for (std::size_t k = 0; k < block; ++k) {
+                const auto index = first + static_cast<std::uint32_t>(k) * stride;
+                if (k == 0 || index / kChunk != (index - stride) / kChunk) latest = nullptr;
+                counts.add(insert_one(index, now[k], budget, latest));
+            }
+        }
+        records = records.subspan(block);
+        first += static_cast<std::uint32_t>(block);
+    }
+    return counts;
+}
+
+// `latest` is the chunk of this index where that is known, and known afterwards.
+template <class Record>
+Insertion RecordTable<Record>::insert_one(std::uint32_t index, const Record& record,
+                                          MemoryBudget& budget, Chunk*& latest) {
     assert(index < expected_);
     if (is_dense()) return insert_dense(index, record);
-    const Insertion outcome = insert_sparse(index, record, budget);
+    if (latest == nullptr) latest = chunk_of(index, budget);
+    const Insertion outcome =
+        latest == nullptr ? Insertion::refused : insert_sparse(index, record, *latest);
     if (size_ * kDenseShare >= expected_) densify(budget);
     return outcome;
 }
 
+// Requires neighbours of one word. False, and nothing done, when they must go one by one.
+template <class Record>
+bool RecordTable<Record>::insert_together(std::uint32_t first, std::span<const Record> records,
+                                          InsertionCounts& counts) {
+    assert(!records.empty() && first + records.size() <= expected_);
+    const std::uint64_t run = ~std::uint64_t{0} >> (64 - records.size()) << first % 64;
+    std::uint64_t& word = present_[first / 64];
+    Record* const kept = dense_.data() + first;
+    if ((word & run) == 0) {
+        std::copy(records.begin(), records.end(), kept);
+        word |= run;
+        size_ += records.size();
+        return true;
+    }
+    if ((word & run) != run) return false;
+    const bool same = same_bits(records, std::span<const Record>(kept, records.size()));
+    if (same) counts.same += records.size();
+    return same;
+}
+
+// Null when there is none and no memory for one.
+template <class Record>
+typename RecordTable<Record>::Chunk* RecordTable<Record>::chunk_of(std::uint32_t index,
+                                                                   MemoryBudget& budget) {
+    const std::uint32_t key = index / kChunk;
+    const auto place = sparse_.lower_bound(key);
+    if (place != sparse_.end() && place->first == key) return &place->second;
+    if (!budget.take(kChunkBytes, bytes_)) return nullptr;
+    bytes_ += kChunkBytes;
+    return &sparse_.emplace_hint(place, key, Chunk{})->second;
+}
+
 template <class Record>
 Insertion RecordTable<Record>::insert_sparse(std::uint32_t index, const Record& record,
-                                             MemoryBudget& budget) {
-    const auto place = sparse_.lower_bound(index);
-    if (place == sparse_.end() || place->first != index) {
-        if (!budget.take(kSparseBytes, bytes_)) return Insertion::refused;
-        bytes_ += kSparseBytes;
-        sparse_.emplace_hint(place, index, Entry{record});
+                                             Chunk& chunk) {
+    Record& kept = chunk.records[index % kChunk];
+    if ((chunk.present & chunk_bit(index)) == 0) {
+        chunk.present |= chunk_bit(index);
+        kept = record;
         ++size_;
         return Insertion::fresh;
     }
-    Entry& entry = place->second;
-    if (order_of(record) == order_of(entry.record)) return Insertion::same;
-    if (order_of(record) < order_of(entry.record)) entry.record = record;
+    if (order_of(record) == order_of(kept)) return Insertion::same;
+    if (order_of(record) < order_of(kept)) kept = record;
     dispute(index);
     return Insertion::conflicting;
 }
@@ -175,10 +284,13 @@ void RecordTable<Record>::densify(MemoryBudget& budget) {
     present_.resize(words());
     disputed_.resize(words());
     dense_.resize(expected_);
-    for (const auto& [index, entry] : sparse_) {
-        dense_[index] = entry.record;
-        present_[index / 64] |= bit(index);
-        if (entry.disputed) disputed_[index / 64] |= bit(index);
+    for (const auto& [key, chunk] : sparse_) {
+        const std::size_t word = key * kChunk / 64;
+        const std::size_t shift = key * kChunk % 64;
+        const std::size_t inside = std::min<std::size_t>(kChunk, expected_ - key * kChunk);
+        std::copy_n(chunk.records.begin(), inside, dense_.begin() + key * kChunk);
+        present_[word] |= std::uint64_t{chunk.present} << shift;
+        disputed_[word] |= std::uint64_t{chunk.disputed} << shift;
     }
     sparse_.clear();
     budget.give_back(bytes_);
@@ -192,9 +304,9 @@ void RecordTable<Record>::dispute(std::uint32_t index) {
         if ((word & bit(index)) == 0) ++disputed_count_;
         word |= bit(index);
     } else {
-        Entry& entry = sparse_.at(index);
-        if (!entry.disputed) ++disputed_count_;
-        entry.disputed = true;
+        Chunk& chunk = sparse_.at(index / kChunk);
+        if ((chunk.disputed & chunk_bit(index)) == 0) ++disputed_count_;
+        chunk.disputed |= chunk_bit(index);
     }
 }
 
@@ -221,7 +333,12 @@ void RecordTable<Record>::release(MemoryBudget& budget) {
 template <class Record>
 template <class Visit>
 void RecordTable<Record>::visit_entries(Visit&& visit) const {
-    for (const auto& [index, entry] : sparse_) visit(index, entry.record, entry.disputed);
+    for (const auto& [key, chunk] : sparse_) {
+        for (std::uint32_t index = key * kChunk; index < (key + 1) * kChunk; ++index) {
+            if ((chunk.present & chunk_bit(index)) == 0) continue;
+            visit(index, chunk.records[index % kChunk], (chunk.disputed & chunk_bit(index)) != 0);
+        }
+    }
     for (std::size_t w = 0; w < present_.size(); ++w) {
         for (std::uint64_t rest = present_[w]; rest != 0; rest &= rest - 1) {
             const auto index = static_cast<std::uint32_t>(

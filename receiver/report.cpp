@@ -3,11 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
+
 #include <algorithm>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "common/atomic_file.hpp"
+#include "common/hex_text.hpp"
 #include "common/model_io.hpp"
 #include "receiver/output_files.hpp"
 
@@ -48,23 +52,66 @@ std::uint64_t lost_in_network(const ReportContent& content) {
     return lost - std::min(lost, content.kernel_dropped);
 }
 
+double share(std::uint64_t part, std::uint64_t whole) {
+    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
 Json datagrams_json(const ReportContent& content) {
     const StreamCounts& counts = content.session.datagrams;
+    const LossPattern& pattern = counts.pattern;
+    const std::uint64_t sent = counts.received - counts.duplicate + counts.lost;
     Json by_cause = Json::object();
     for (std::size_t k = 0; k < static_cast<std::size_t>(protocol::WireError::kCount); ++k) {
         const auto cause = static_cast<protocol::WireError>(k);
         by_cause[std::string(to_string(cause))] = content.session.malformed.of(cause);
     }
-    return {{"received", counts.received},
-            {"lost", counts.lost},
-            {"duplicate", counts.duplicate},
-            {"reordered", counts.reordered},
-            {"malformed", content.session.malformed.total()},
-            {"kernel_dropped", content.kernel_dropped},
-            {"bytes", counts.bytes},
-            {"lost_in_network", lost_in_network(content)},
-            {"jitter_ms", counts.jitter_ms},
-            {"malformed_by", by_cause}};
+    Json refused_by = Json::object();
+    std::uint64_t refused = 0;
+    for (std::size_t k = 0; k < content.session.refused.size(); ++k) {
+        refused_by[std::string(to_string(static_cast<Refusal>(k)))] = content.session.refused[k];
+        refused += content.session.refused[k];
+    }
+    return {
+        {"received", counts.received},
+        {"lost", counts.lost},
+        {"duplicate", counts.duplicate},
+        {"reordered", counts.reordered},
+        {"malformed", content.session.malformed.total()},
+        {"kernel_dropped", content.kernel_dropped},
+        {"bytes", counts.bytes},
+        {"lost_in_network", lost_in_network(content)},
+        {"jitter_ms", counts.jitter_ms},
+        {"loss_rate", share(counts.lost, sent)},
+        {"recent", {{"lost", counts.recent_lost}, {"expected", counts.recent_expected}}},
+        {"reorder",
+         {{"mean", share(counts.reorder_sum, counts.reordered)},
+          {"farthest", counts.reorder_farthest}}},
+        {"runs",
+         {{"count", pattern.runs}, {"mean", pattern.mean_run()}, {"longest", pattern.longest_run}}},
+        {"bursts",
+         {{"count", pattern.bursts},
+          {"loss_density", pattern.burst_density()},
+          {"mean_datagrams", pattern.mean_burst()},
+          {"mean_ms", pattern.mean_burst() * counts.datagram_ms}}},
+        {"gaps",
+         {{"count", pattern.gaps},
+          {"loss_density", pattern.gap_density()},
+          {"mean_datagrams", pattern.mean_gap()},
+          {"mean_ms", pattern.mean_gap() * counts.datagram_ms}}},
+        {"malformed_by", by_cause},
+        {"refused", refused},
+        {"refused_by", refused_by},
+        {"unverified_dropped", content.session.unverified_dropped}};
+}
+
+Json authenticity_json(const ReportContent& content) {
+    if (!content.object) return nullptr;
+    const Authenticity& authenticity = content.session.authenticity;
+    Json json = {{"signed", authenticity.is_signed},
+                 {"sealed", authenticity.sealed},
+                 {"verified_by", nullptr}};
+    if (authenticity.verified()) json["verified_by"] = common::hex_text(authenticity.key);
+    return json;
 }
 
 std::size_t vertices_in_mesh(const ReportContent& content) {
@@ -81,6 +128,10 @@ void add_records(const ReportContent& content, Json& report) {
     report["vertices"] = {{"received", object ? object->vertices.size() : 0},
                           {"expected", object ? object->hint.vertices : 0},
                           {"in_mesh", vertices_in_mesh(content)}};
+    report["edges"] = {{"received", object ? object->edges.size() : 0}};
+}
+
+void add_strangers(const ReportContent& content, Json& report) {
     const SessionSummary& session = content.session;
     report["records"] = {{"repeated", session.store.repeated},
                          {"conflicting", session.conflicting},
@@ -161,11 +212,9 @@ std::string plural(std::size_t count, const char* one, const char* many) {
 std::string datagram_line(const ReportContent& content) {
     const StreamCounts& counts = content.session.datagrams;
     const std::uint64_t sent = counts.received - counts.duplicate + counts.lost;
-    const double share =
-        sent > 0 ? 100.0 * static_cast<double>(counts.lost) / static_cast<double>(sent) : 0.0;
     std::string line =
         fmt::format("{}, {} lost ({:.1f} %)", plural(counts.received, "datagram", "datagrams"),
-                    counts.lost, share);
+                    counts.lost, 100.0 * share(counts.lost, sent));
     const auto mention = [&](std::uint64_t count, const char* what) {
         if (count > 0) line += fmt::format(", {} {}", count, what);
     };
@@ -173,6 +222,9 @@ std::string datagram_line(const ReportContent& content) {
     mention(counts.duplicate, "duplicate");
     mention(counts.reordered, "reordered");
     mention(content.session.malformed.total(), "malformed");
+    const RefusalCounts& refused = content.session.refused;
+    mention(std::accumulate(refused.begin(), refused.end(), std::uint64_t{0}), "refused");
+    mention(content.session.unverified_dropped, "dropped unverified");
     mention(content.session.other_datagrams, "of others");
     return line + "\n";
 }
@@ -211,6 +263,21 @@ std::string missing_line(const ReportContent& content) {
     return line + "\n";
 }
 
+Json live_json(const ReportContent& content) {
+    if (!content.live) return nullptr;
+    const LiveSummary& live = *content.live;
+    const auto ms = [](Time time) {
+        return std::chrono::duration<double, std::milli>(time).count();
+    };
+    if (live.updates == 0) return {{"updates", 0}, {"first_shape_ms", nullptr}, {"last", nullptr}};
+    return {{"updates", live.updates},
+            {"first_shape_ms", ms(live.first_shape)},
+            {"last",
+             {{"ms", ms(live.last_shape)},
+              {"vertices", live.last_vertices},
+              {"records", live.last_records}}}};
+}
+
 }  // namespace
 
 nlohmann::ordered_json make_report(const ReportContent& content) {
@@ -223,20 +290,38 @@ nlohmann::ordered_json make_report(const ReportContent& content) {
     report["hint"] = hint_json(content);
     report["record_format"] = record_format_json(content);
     report["datagrams"] = datagrams_json(content);
+    report["authenticity"] = authenticity_json(content);
     add_records(content, report);
+    add_strangers(content, report);
+    report["live"] = live_json(content);
     add_mesh(content, report);
     if (content.quality) report["quality"] = quality_json(*content.quality);
     report["seconds"] = Json::object();
     for (const StageTime& time : content.times) {
         report["seconds"][time.stage] = {{"wall", time.wall_s}, {"cpu", time.cpu_s}};
     }
+    report["pages"] = Json::array();
+    for (const PageResult& page : content.pages) report["pages"].push_back(page_json(page));
     return report;
 }
 
+void add_counts(const ReportContent& content, Json& json) {
+    json["datagrams"] = datagrams_json(content);
+    add_strangers(content, json);
+    json["live"] = live_json(content);
+}
+
+std::string program_version() {
+    return ELLICAST_VERSION;
+}
+
 void write_report(const std::filesystem::path& path, const ReportContent& content) {
+    write_json(path, make_report(content));
+}
+
+void write_json(const std::filesystem::path& path, const Json& json) {
     // A path need not be UTF-8, and no report is worth failing for that.
-    const std::string text =
-        make_report(content).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
     try {
         common::write_file_atomically(path, text);
     } catch (const common::WriteFailure& failure) {

@@ -38,15 +38,10 @@ constexpr double kFlat = 0.1;  // radians
 constexpr double kSureGain = 2.0;
 constexpr double kSureLossyGain = 1.0;
 
-double mean_edge_length(const SurfaceMesh& mesh) {
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (HalfedgeId h = 0; h < 3 * mesh.face_slots(); ++h) {
-        if (!mesh.face_alive(SurfaceMesh::face_of(h))) continue;
-        sum += (mesh.position(mesh.from_vertex(h)) - mesh.position(mesh.to_vertex(h))).norm();
-        ++count;
-    }
-    return sum > 0.0 ? sum / static_cast<double>(count) : 1.0;
+// A length to measure creases by; never zero.
+double unit_of(const SurfaceMesh& mesh) {
+    const double mean = mean_edge_length(mesh);
+    return mean > 0.0 ? mean : 1.0;
 }
 
 class Repair {
@@ -55,7 +50,7 @@ class Repair {
         : mesh_(mesh),
           witnesses_(witnesses),
           lossy_(lossy),
-          unit_(mean_edge_length(mesh)),
+          unit_(unit_of(mesh)),
           syndromes_(mesh.vertex_slots()),
           listed_(mesh.vertex_slots(), 0) {
         for (VertexId v = 0; v < mesh_.vertex_slots(); ++v) {

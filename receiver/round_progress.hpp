@@ -24,9 +24,16 @@ class RoundProgress {
     /// datagram, or any of a later round, was seen.
     [[nodiscard]] std::optional<Time> full_round_end() const { return full_round_end_; }
 
+    /// How many rounds, counted from the sender's first, are known to be over.
+    [[nodiscard]] std::uint64_t rounds_over() const { return rounds_over_; }
+    /// The highest round heard.
+    [[nodiscard]] std::uint32_t round() const { return round_; }
+
   private:
     bool joined_ = false;
     std::uint64_t full_round_ = 0;  // the first round received from its start
+    std::uint64_t rounds_over_ = 0;
+    std::uint32_t round_ = 0;
     std::optional<Time> stream_end_;
     std::optional<Time> full_round_end_;
 };

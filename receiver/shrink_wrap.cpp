@@ -1,11 +1,16 @@
 // receiver/shrink_wrap.cpp
 #include "receiver/shrink_wrap.hpp"
 
+#include <algorithm>
+#include <cassert>
 #include <cstdint>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/parallel.hpp"
-#include "common/triangle_tree.hpp"
+#include "receiver/closest_triangles.hpp"
+#include "receiver/surface_walk.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -14,6 +19,8 @@ using Eigen::Vector3d;
 
 // Jacobi sweeps by which pulled vertices carry along those that no point pulls.
 constexpr int kDiffusionSweeps = 12;
+// So many points a vertex tell it where to go; more would tell the same.
+constexpr std::size_t kPointsPerVertex = 8;
 // Share of the tangential way to the neighbours' centroid in a round.
 constexpr double kTangentialStep = 0.5;
 
@@ -44,17 +51,29 @@ struct Pull {
     Vector3d offset = Vector3d::Zero();
 };
 
-// Weighted mean offset per vertex, and how much weight stands behind it.
-void gather_pulls(const common::TriangleMesh& mesh, std::span<const Vector3d> points,
-                  unsigned threads, std::vector<Vector3d>& offset, std::vector<double>& weight) {
-    const common::TriangleTree tree(mesh);
-    std::vector<Pull> pulls(points.size());
+// The place of every point on the surface: by a search first, later by a walk from where it was,
+// for a round moves neither far.
+void find_places(const SurfaceMesh& surface, const common::TriangleMesh& mesh,
+                 const std::vector<Vector3d>& points, bool first, unsigned threads,
+                 std::vector<Pull>& pulls) {
+    if (first) {
+        visit_closest_triangles(
+            mesh, points, threads, [&](std::size_t i, const common::TriangleTree::Hit& hit) {
+                pulls[i] = {hit.triangle, hit.barycentric, points[i] - hit.point};
+            });
+        return;
+    }
     common::parallel_for(points.size(), threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const common::TriangleTree::Hit hit = tree.closest(points[i]);
-            pulls[i] = {hit.triangle, hit.barycentric, points[i] - hit.point};
+            const SurfacePlace place = walk_to_closest(surface, pulls[i].triangle, points[i]);
+            pulls[i] = {place.face, place.barycentric, points[i] - place.point};
         }
     });
+}
+
+// Weighted mean offset per vertex, and how much weight stands behind it.
+void gather_pulls(const common::TriangleMesh& mesh, const std::vector<Pull>& pulls,
+                  std::vector<Vector3d>& offset, std::vector<double>& weight) {
     offset.assign(mesh.positions.size(), Vector3d::Zero());
     weight.assign(mesh.positions.size(), 0.0);
     for (const Pull& pull : pulls) {
@@ -118,17 +137,27 @@ void smooth_tangentially(const Neighbours& neighbours, common::TriangleMesh& mes
 
 }  // namespace
 
-void shrink_wrap(common::TriangleMesh& mesh, std::span<const Vector3d> points, int rounds,
+void shrink_wrap(common::TriangleMesh& mesh, std::span<const Vector3d> all_points, int rounds,
                  unsigned threads) {
+    const std::size_t asked = std::min(all_points.size(), kPointsPerVertex * mesh.positions.size());
+    const std::vector<Vector3d> points(all_points.begin(),
+                                       all_points.begin() + static_cast<std::ptrdiff_t>(asked));
     if (points.empty() || mesh.triangles.empty()) return;
+    std::optional<SurfaceMesh> surface = SurfaceMesh::from(mesh);
+    assert(surface);
     const Neighbours neighbours = neighbours_of(mesh);
+    std::vector<Pull> pulls(points.size());
     std::vector<Vector3d> offset;
     std::vector<double> weight;
     for (int round = 0; round < rounds; ++round) {
-        gather_pulls(mesh, points, threads, offset, weight);
+        find_places(*surface, mesh, points, round == 0, threads, pulls);
+        gather_pulls(mesh, pulls, offset, weight);
         diffuse(neighbours, weight, offset);
         for (std::size_t v = 0; v < offset.size(); ++v) mesh.positions[v] += offset[v];
         smooth_tangentially(neighbours, mesh);
+        for (VertexId v = 0; v < mesh.positions.size(); ++v) {
+            surface->set_position(v, mesh.positions[v]);
+        }
     }
 }
 

@@ -12,8 +12,11 @@ namespace ellicast::receiver {
 /// (DESIGN section 4: better error, and insertion 1.5-2 times faster). In each round every point
 /// pulls the corners of its closest triangle by its offset, shared by barycentric weight; vertices
 /// that no point pulls follow their neighbours; then a tangential smoothing step keeps the
-/// triangles round. Connectivity is untouched. Threads do not change the result. Cost per round: a
-/// tree and a query a point.
+/// triangles round. Closest triangles are searched once and followed from round to round by short
+/// walks. Connectivity is untouched. Only the first eight points a vertex are asked, so that
+/// prefixes of `points` should be even samples. Threads do not change the result. Requires a closed
+/// oriented 2-manifold. Cost per
+/// round: linear.
 void shrink_wrap(common::TriangleMesh& mesh, std::span<const Eigen::Vector3d> points, int rounds,
                  unsigned threads);
 

@@ -37,6 +37,8 @@ void SimulatedLoss::offer(const Source& source, std::span<const std::uint8_t> da
             case protocol::SectionKind::vertices:
                 return !network->vertices.next_is_lost();
             case protocol::SectionKind::description:
+            case protocol::SectionKind::page:
+            case protocol::SectionKind::edges:
                 return true;
         }
         return true;

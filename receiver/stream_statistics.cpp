@@ -42,6 +42,12 @@ StreamCounts& StreamCounts::operator+=(const StreamCounts& other) {
     duplicate += other.duplicate;
     reordered += other.reordered;
     bytes += other.bytes;
+    reorder_farthest = std::max(reorder_farthest, other.reorder_farthest);
+    reorder_sum += other.reorder_sum;
+    recent_lost += other.recent_lost;
+    recent_expected += other.recent_expected;
+    pattern += other.pattern;
+    if (other.datagram_ms > 0) datagram_ms = other.datagram_ms;
     jitter_ms = std::max(jitter_ms, other.jitter_ms);
     return *this;
 }
@@ -63,15 +69,24 @@ void StreamStatistics::on_datagram(Time now, const protocol::DatagramHeader& hea
     last_seen_ = now;
 
     const bool late = place.sequence <= newest_.sequence && distinct_ > 0;
+    if (place.sequence > newest_.sequence) settle(place.sequence);
     if (!mark(place.sequence)) {
         ++counts_.duplicate;
         return;
     }
-    if (late) ++counts_.reordered;
+    if (late) {
+        const auto behind = static_cast<std::uint64_t>(newest_.sequence - place.sequence);
+        ++counts_.reordered;
+        counts_.reorder_sum += behind;
+        counts_.reorder_farthest = std::max(counts_.reorder_farthest, behind);
+    }
     if (distinct_++ > 0) update_jitter(now, header.rtp.timestamp);
     previous_arrival_ = now;
     previous_timestamp_ = header.rtp.timestamp;
-    if (place.sequence < oldest_.sequence) oldest_ = place;
+    if (place.sequence < oldest_.sequence) {
+        if (settled_ == oldest_.sequence) settled_ = place.sequence;  // nothing was settled yet
+        oldest_ = place;
+    }
     if (place.sequence > newest_.sequence) {
         newest_ = place;
         newest_seen_ = now;
@@ -85,6 +100,48 @@ std::size_t StreamStatistics::word_of(std::int64_t sequence) {
 void StreamStatistics::start(Time now, const Place& place) {
     first_seen_ = newest_seen_ = now;
     oldest_ = newest_ = place;
+    settled_ = place.sequence;
+}
+
+bool StreamStatistics::was_seen(std::int64_t sequence) const {
+    return (seen_[word_of(sequence)] & bit_of(sequence)) != 0;
+}
+
+void StreamStatistics::settle_until(std::int64_t end, std::int64_t& settled, LossRuns& runs,
+                                    const StreamStatistics& of) {
+    for (; settled < end; ++settled) {
+        if (of.was_seen(settled)) {
+            runs.add_received();
+        } else {
+            runs.add_lost();
+        }
+    }
+}
+
+// Before `newest` makes the window forget: what lies kSettling behind it has its fate. Numbers that
+// were jumped over are lost without a look.
+void StreamStatistics::settle(std::int64_t newest) {
+    const std::int64_t end = newest - kSettling;
+    settle_until(std::min(end, newest_.sequence + 1), settled_, runs_, *this);
+    if (settled_ < end) {
+        runs_.add_lost(static_cast<std::uint64_t>(end - settled_));
+        settled_ = end;
+    }
+}
+
+void StreamStatistics::add_pattern(StreamCounts& counts) const {
+    LossRuns runs = runs_;
+    std::int64_t settled = settled_;
+    settle_until(newest_.sequence + 1, settled, runs, *this);
+    counts.pattern = runs.pattern();
+    const std::int64_t begin = std::max(oldest_.sequence, newest_.sequence - kRecent + 1);
+    for (std::int64_t s = begin; s <= newest_.sequence; ++s) counts.recent_lost += !was_seen(s);
+    counts.recent_expected = static_cast<std::uint64_t>(newest_.sequence - begin + 1);
+    const std::int64_t steps = newest_.sequence - oldest_.sequence;
+    if (steps > 0) {
+        counts.datagram_ms =
+            1000.0 * to_seconds(newest_seen_ - first_seen_) / static_cast<double>(steps);
+    }
 }
 
 std::int64_t StreamStatistics::extend(const protocol::DatagramHeader& header) const {
@@ -157,6 +214,7 @@ StreamCounts StreamStatistics::counts(bool ended) const {
     const auto span = static_cast<std::uint64_t>(newest_.sequence - oldest_.sequence) + 1;
     counts.lost = span - std::min(span, distinct_) + lost_head() + (ended ? lost_tail() : 0);
     counts.jitter_ms = jitter_ * 1000.0 / protocol::kRtpClockHz;
+    add_pattern(counts);
     return counts;
 }
 

@@ -8,6 +8,7 @@
 
 #include "protocol/datagram.hpp"
 #include "receiver/arrival.hpp"
+#include "receiver/loss_runs.hpp"
 #include "receiver/record_store.hpp"
 
 namespace ellicast::receiver {
@@ -21,6 +22,16 @@ struct StreamCounts {
     std::uint64_t reordered = 0;  // came after one that was sent later
     std::uint64_t bytes = 0;      // UDP payload of the received
     double jitter_ms = 0;         // RFC 3550 section 6.4.1; of several streams, the largest
+    // How far behind the newest the reordered came, in datagrams (RFC 4737's extent): the farthest,
+    // and the sum.
+    std::uint64_t reorder_farthest = 0;
+    std::uint64_t reorder_sum = 0;
+    // Among the last kRecent numbers, or as many as there were.
+    std::uint64_t recent_lost = 0;
+    std::uint64_t recent_expected = 0;
+    // From the first number heard to the last. Who comes later than kSettling numbers is lost here.
+    LossPattern pattern;
+    double datagram_ms = 0;  // mean time from number to number; of several streams, the latest's
 
     StreamCounts& operator+=(const StreamCounts& other);
 };
@@ -39,6 +50,9 @@ class StreamStatistics {
     /// What the rounds announced before the first datagram counts as far as it was sent while we
     /// listened, going by the stream's mean pace.
     [[nodiscard]] StreamCounts counts(bool ended) const;
+
+    static constexpr std::int64_t kRecent = 1024;
+    static constexpr std::int64_t kSettling = 512;
 
     [[nodiscard]] Time last_seen() const { return last_seen_; }
     [[nodiscard]] std::uint64_t received() const { return counts_.received; }
@@ -61,6 +75,11 @@ class StreamStatistics {
     [[nodiscard]] std::uint64_t lost_tail() const;
     void start(Time now, const Place& place);
     static std::size_t word_of(std::int64_t sequence);
+    [[nodiscard]] bool was_seen(std::int64_t sequence) const;
+    void settle(std::int64_t newest);
+    static void settle_until(std::int64_t end, std::int64_t& settled, LossRuns& runs,
+                             const StreamStatistics& of);
+    void add_pattern(StreamCounts& counts) const;
     bool mark(std::int64_t sequence);
     void update_jitter(Time now, std::uint32_t timestamp);
 
@@ -75,6 +94,8 @@ class StreamStatistics {
     Place newest_;       // highest
     std::uint64_t distinct_ = 0;
     StreamCounts counts_;
+    std::int64_t settled_ = 0;  // numbers below are in runs_
+    LossRuns runs_;
     std::vector<std::uint64_t> seen_;  // ring of bits over the last kWindow sequence numbers
 };
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cassert>
+#include <span>
+#include <tuple>
 #include <utility>
 
 namespace ellicast::receiver {
@@ -20,25 +22,7 @@ std::optional<SurfaceMesh> SurfaceMesh::from(const common::TriangleMesh& mesh) {
         }
         if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return std::nullopt;
     }
-    // Pair half-edges by sorting (low vertex, high vertex, half-edge).
-    std::vector<std::pair<std::uint64_t, HalfedgeId>> keys(result.corners_.size());
-    for (HalfedgeId h = 0; h < keys.size(); ++h) {
-        const std::uint64_t a = result.from_vertex(h);
-        const std::uint64_t b = result.to_vertex(h);
-        keys[h] = {std::min(a, b) << 32 | std::max(a, b), h};
-    }
-    std::sort(keys.begin(), keys.end());
-    result.twins_.assign(keys.size(), kNone);
-    if (keys.size() % 2 != 0) return std::nullopt;
-    for (std::size_t i = 0; i < keys.size(); i += 2) {
-        const auto& [key_a, a] = keys[i];
-        const auto& [key_b, b] = keys[i + 1];
-        const bool triple = i + 2 < keys.size() && keys[i + 2].first == key_a;
-        if (key_a != key_b || triple || result.from_vertex(a) == result.from_vertex(b)) {
-            return std::nullopt;
-        }
-        result.link(a, b);
-    }
+    if (!result.pair_halfedges()) return std::nullopt;
     for (const HalfedgeId h : result.outgoing_) {
         if (h == kNone) return std::nullopt;
     }
@@ -48,6 +32,48 @@ std::optional<SurfaceMesh> SurfaceMesh::from(const common::TriangleMesh& mesh) {
     for (VertexId v = 0; v < mesh.positions.size(); ++v) corners += result.valence(v);
     if (corners != result.corners_.size()) return std::nullopt;
     return result;
+}
+
+bool SurfaceMesh::pair_halfedges() {
+    // In buckets by the lower vertex, each sorted by the higher one: linear, as buckets are small.
+    struct Side {
+        VertexId high;
+        HalfedgeId h;
+    };
+    const auto low = [&](HalfedgeId h) { return std::min(from_vertex(h), to_vertex(h)); };
+    const auto count = static_cast<HalfedgeId>(corners_.size());
+    std::vector<HalfedgeId> first(positions_.size() + 2, 0);
+    for (HalfedgeId h = 0; h < count; ++h) ++first[low(h) + 2];
+    for (std::size_t v = 2; v < first.size(); ++v) first[v] += first[v - 1];
+    std::vector<Side> sides(count);
+    for (HalfedgeId h = 0; h < count; ++h) {
+        sides[first[low(h) + 1]++] = {std::max(from_vertex(h), to_vertex(h)), h};
+    }
+    twins_.assign(count, kNone);
+    for (std::size_t v = 0; v < positions_.size(); ++v) {
+        const std::span bucket(&sides[0] + first[v], first[v + 1] - first[v]);
+        if (bucket.size() % 2 != 0) return false;
+        std::sort(bucket.begin(), bucket.end(), [](const Side& a, const Side& b) {
+            return std::tie(a.high, a.h) < std::tie(b.high, b.h);
+        });
+        for (std::size_t i = 0; i < bucket.size(); i += 2) {
+            const Side& a = bucket[i];
+            const Side& b = bucket[i + 1];
+            const bool triple = i + 2 < bucket.size() && bucket[i + 2].high == a.high;
+            if (a.high != b.high || triple || from_vertex(a.h) == from_vertex(b.h)) return false;
+            link(a.h, b.h);
+        }
+    }
+    return true;
+}
+
+void SurfaceMesh::reserve(std::size_t more_vertices) {
+    positions_.reserve(positions_.size() + more_vertices);
+    outgoing_.reserve(outgoing_.size() + more_vertices);
+    const std::size_t more_faces =
+        2 * more_vertices - std::min(2 * more_vertices, free_faces_.size());
+    corners_.reserve(corners_.size() + 3 * more_faces);
+    twins_.reserve(twins_.size() + 3 * more_faces);
 }
 
 std::size_t SurfaceMesh::valence(VertexId v) const {
@@ -245,7 +271,12 @@ Eigen::Vector3d SurfaceMesh::area_normal(FaceId f) const {
 common::TriangleMesh SurfaceMesh::extract(std::vector<VertexId>* vertex_of) const {
     common::TriangleMesh mesh;
     std::vector<std::uint32_t> number(positions_.size(), kNone);
-    if (vertex_of) vertex_of->clear();
+    mesh.positions.reserve(live_vertices_);
+    mesh.triangles.reserve(face_slots() - free_faces_.size());
+    if (vertex_of) {
+        vertex_of->clear();
+        vertex_of->reserve(live_vertices_);
+    }
     for (VertexId v = 0; v < positions_.size(); ++v) {
         if (!vertex_alive(v)) continue;
         number[v] = static_cast<std::uint32_t>(mesh.positions.size());
@@ -289,6 +320,17 @@ std::string SurfaceMesh::validate() const {
     }
     if (in_fans != corners) return "a vertex has more than one fan";
     return "";
+}
+
+double mean_edge_length(const SurfaceMesh& mesh) {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (HalfedgeId h = 0; h < 3 * mesh.face_slots(); ++h) {
+        if (!mesh.face_alive(SurfaceMesh::face_of(h))) continue;
+        sum += (mesh.position(mesh.from_vertex(h)) - mesh.position(mesh.to_vertex(h))).norm();
+        ++count;
+    }
+    return count == 0 ? 0.0 : sum / static_cast<double>(count);
 }
 
 }  // namespace ellicast::receiver

@@ -32,6 +32,9 @@ class SurfaceMesh {
     /// otherwise.
     static std::optional<SurfaceMesh> from(const common::TriangleMesh& mesh);
 
+    /// Room for so many more vertices and their faces, so that no array is moved meanwhile.
+    void reserve(std::size_t more_vertices);
+
     [[nodiscard]] std::size_t vertex_slots() const { return positions_.size(); }
     [[nodiscard]] std::size_t face_slots() const { return corners_.size() / 3; }
     [[nodiscard]] bool vertex_alive(VertexId v) const { return outgoing_[v] != kNone; }
@@ -96,6 +99,8 @@ class SurfaceMesh {
     [[nodiscard]] std::string validate() const;
 
   private:
+    /// Sets the twins; false when an edge has not two half-edges of opposite directions.
+    bool pair_halfedges();
     FaceId new_face();
     void set_face(FaceId f, VertexId a, VertexId b, VertexId c);
     void link(HalfedgeId a, HalfedgeId b) {
@@ -110,5 +115,8 @@ class SurfaceMesh {
     std::vector<FaceId> free_faces_;
     std::size_t live_vertices_ = 0;
 };
+
+/// Mean over all live faces' edges; 0 without any. Linear.
+double mean_edge_length(const SurfaceMesh& mesh);
 
 }  // namespace ellicast::receiver

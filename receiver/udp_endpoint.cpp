@@ -4,22 +4,28 @@
 #include <utility>
 // asio 1.74 needs <utility> first in C++20.
 #include <linux/sock_diag.h>
+#include <net/if.h>
 #include <sys/socket.h>
-#include <time.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <spdlog/spdlog.h>
 #include <algorithm>
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <cstring>
-#include <span>
-#include <vector>
+#include <thread>
+
+#include "receiver/receive_thread.hpp"
+#include "receiver/socket_settings.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -28,40 +34,11 @@ namespace asio = boost::asio;
 using asio::ip::udp;
 using boost::system::error_code;
 
-constexpr std::uint16_t kDefaultPort = 5004;  // RFC 3551 section 8
-constexpr int kReceiveBuffer = 64 << 20;      // half a second at 1 Gbit/s
-constexpr std::size_t kBatch = 64;            // datagrams a system call
-constexpr std::size_t kSlotBytes = 1 << 16;   // no UDP payload is larger
-constexpr int kBatchesPerTurn = 32;           // then signals and timers get their turn
+constexpr std::uint16_t kDefaultPort = 5004;     // RFC 3551 section 8
+constexpr int kReceiveBuffer = 64 << 20;         // half a second at 1 Gbit/s
+constexpr std::size_t kDatagramsPerTurn = 2048;  // then signals and timers get their turn
 constexpr Time kTick = std::chrono::milliseconds(100);
-
-Time to_time(const timespec& t) {
-    return std::chrono::seconds(t.tv_sec) + std::chrono::nanoseconds(t.tv_nsec);
-}
-
-Time wall_clock() {
-    timespec t{};
-    clock_gettime(CLOCK_REALTIME, &t);
-    return to_time(t);
-}
-
-Source source_of(const sockaddr_storage& address) {
-    Source source;
-    if (address.ss_family == AF_INET6) {
-        sockaddr_in6 v6{};
-        std::memcpy(&v6, &address, sizeof(v6));
-        std::memcpy(source.address.data(), &v6.sin6_addr, 16);
-        std::memcpy(source.address.data() + 16, &v6.sin6_scope_id, 4);
-        source.port = ntohs(v6.sin6_port);
-    } else if (address.ss_family == AF_INET) {
-        sockaddr_in v4{};
-        std::memcpy(&v4, &address, sizeof(v4));
-        source.address[10] = source.address[11] = 0xff;
-        std::memcpy(source.address.data() + 12, &v4.sin_addr, 4);
-        source.port = ntohs(v4.sin_port);
-    }
-    return source;
-}
+constexpr Time kLastTurn = std::chrono::milliseconds(100);
 
 std::string text_of(const udp::endpoint& endpoint) {
     const std::string address = endpoint.address().to_string();
@@ -69,67 +46,37 @@ std::string text_of(const udp::endpoint& endpoint) {
     return (endpoint.address().is_v6() ? "[" + address + "]:" : address + ":") + port;
 }
 
-// What a recvmmsg call fills.
-class Batch {
-  public:
-    Batch() : bytes_(kBatch * kSlotBytes) {}
-
-    /// Number of datagrams taken; 0 when none waits, or the socket had an error to tell (which for
-    /// UDP concerns no later datagram).
-    std::size_t receive(int socket) {
-        for (std::size_t k = 0; k < kBatch; ++k) prepare(k);
-        const int count = recvmmsg(socket, messages_.data(), kBatch, MSG_DONTWAIT, nullptr);
-        return count > 0 ? static_cast<std::size_t>(count) : 0;
-    }
-    [[nodiscard]] std::span<const std::uint8_t> bytes(std::size_t k) const {
-        return {bytes_.data() + k * kSlotBytes, messages_[k].msg_len};
-    }
-    [[nodiscard]] Source source(std::size_t k) const { return source_of(names_[k]); }
-
-    /// Calls visit(cmsg) for each control message of datagram k.
-    template <class Visit>
-    void for_each_control(std::size_t k, Visit&& visit) {
-        msghdr* const header = &messages_[k].msg_hdr;
-        for (cmsghdr* c = CMSG_FIRSTHDR(header); c != nullptr; c = CMSG_NXTHDR(header, c)) {
-            visit(*c);
-        }
-    }
-
-  private:
-    struct alignas(cmsghdr) Control {
-        std::array<unsigned char, CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))>
-            bytes;
-    };
-    void prepare(std::size_t k) {
-        slots_[k] = {bytes_.data() + k * kSlotBytes, kSlotBytes};
-        msghdr& header = messages_[k].msg_hdr;
-        header = {};
-        header.msg_name = &names_[k];
-        header.msg_namelen = sizeof(names_[k]);
-        header.msg_iov = &slots_[k];
-        header.msg_iovlen = 1;
-        header.msg_control = controls_[k].bytes.data();
-        header.msg_controllen = controls_[k].bytes.size();
-    }
-
-    std::vector<std::uint8_t> bytes_;
-    std::array<mmsghdr, kBatch> messages_{};
-    std::array<iovec, kBatch> slots_{};
-    std::array<sockaddr_storage, kBatch> names_{};
-    std::array<Control, kBatch> controls_{};
-};
-
-udp::endpoint endpoint_of(asio::io_context& io, const common::Endpoint& listen) {
-    const std::uint16_t port = listen.port.value_or(kDefaultPort);
-    if (listen.host.empty()) return {udp::v6(), port};
+udp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16_t port) {
     error_code error;
     udp::resolver resolver(io);
-    const auto found =
-        resolver.resolve(listen.host, std::to_string(port), udp::resolver::passive, error);
+    const auto found = resolver.resolve(host, std::to_string(port), udp::resolver::passive, error);
     if (error || found.empty()) {
-        throw ListenError("cannot listen on '" + listen.host + "': " + error.message());
+        throw ListenError("cannot listen on '" + host + "': " + error.message());
     }
     return found.begin()->endpoint();
+}
+
+/// Groups of one link mean something only together with an interface.
+udp::endpoint on_interface(udp::endpoint endpoint, unsigned interface) {
+    if (interface == 0 || !endpoint.address().is_v6()) return endpoint;
+    asio::ip::address_v6 address = endpoint.address().to_v6();
+    if (address.scope_id() != 0) return endpoint;
+    if (address.is_link_local() || address.is_multicast_link_local()) address.scope_id(interface);
+    return {address, endpoint.port()};
+}
+
+/// The interface that the user named, by option or with a group of one link; empty where none.
+std::string name_of_interface(const ListenOptions& options, const udp::endpoint& endpoint) {
+    if (!options.interface.empty() || !endpoint.address().is_v6()) return options.interface;
+    std::array<char, IF_NAMESIZE> name{};
+    const auto scope = static_cast<unsigned>(endpoint.address().to_v6().scope_id());
+    return ::if_indextoname(scope, name.data()) != nullptr ? name.data() : "";
+}
+
+::sockaddr_storage storage_of(const udp::endpoint& endpoint) {
+    ::sockaddr_storage storage{};
+    std::memcpy(&storage, endpoint.data(), endpoint.size());
+    return storage;
 }
 
 }  // namespace
@@ -143,105 +90,138 @@ struct UdpEndpoint::Impl {
     udp::socket socket{io};
     asio::signal_set signals{io};
     asio::steady_timer timer{io};
-    Batch batch;
-    std::uint32_t drops_seen = 0;  // the kernel's counter, modulo 2^32
-    std::uint64_t drops = 0;
-    Time latest{};  // handed to the session; its time must not run backwards
+    std::uint64_t drops = 0;  // by the kernel
+    Time latest{};            // handed to the session; its time must not run backwards
+
+    // Where we listen, to find it again.
+    udp::endpoint bound;
+    std::string interface;  // by name; empty: none in particular
+    unsigned interface_number = 0;
+    std::string source;
+    bool complained = false;
+
+    // While running.
+    bool turn_posted = false;
+    ReceiveThread* thread = nullptr;
     Session* session = nullptr;
     std::function<void(Time)> on_tick;
+    std::function<void(Time)> on_arrival;
 
-    void open(udp::endpoint endpoint, bool any);
-    void set_options();
-    void note_drops(std::uint32_t counter);
-    void wait_for_datagrams();
+    void open(const ListenOptions& options);
+    void join();
+    void follow_interface();
+    void post_turn();
+    void take_turn();
     void wait_for_tick();
-    bool drain(int batches);
-    void take(std::size_t count);
+    void wait_for_signal();
+    void take(std::size_t most);
+    void take_what_has_arrived();
+    void count_drops();
     void stop_if_finished();
     Time advance(Time to) { return latest = std::max(latest, to); }
 };
 
-void UdpEndpoint::Impl::open(udp::endpoint endpoint, bool any) {
+void UdpEndpoint::Impl::open(const ListenOptions& options) {
+    const std::string& host = options.listen.host;
+    const std::uint16_t port = options.listen.port.value_or(kDefaultPort);
+    source = options.source;
+    interface_number = interface_index(options.interface);
+    udp::endpoint endpoint(udp::v6(), port);
+    if (!host.empty()) endpoint = on_interface(resolve(io, host, port), interface_number);
+    const bool group = endpoint.address().is_multicast();
+    if (!options.source.empty() && !group) {
+        throw ListenError("--source " + options.source + ": only of a multicast group");
+    }
     error_code error;
     socket.open(endpoint.protocol(), error);
-    if (error && any) {  // a host without IPv6
-        endpoint = {udp::v4(), endpoint.port()};
+    if (error && host.empty()) {  // a host without IPv6
+        endpoint = {udp::v4(), port};
         socket.open(endpoint.protocol(), error);
     }
-    if (!error && any && endpoint.protocol() == udp::v6()) {
+    if (!error && host.empty() && endpoint.protocol() == udp::v6()) {
         socket.set_option(asio::ip::v6_only(false), error);
+    }
+    if (!error && group) share_port(socket.native_handle());
+    if (!error && !group && interface_number != 0) {
+        bind_to_interface(socket.native_handle(), options.interface);
     }
     if (!error) socket.bind(endpoint, error);
     if (error) {
         throw ListenError("cannot listen on " + text_of(endpoint) + ": " + error.message());
     }
+    bound = endpoint;
+    interface = name_of_interface(options, endpoint);
+    interface_number = interface_index(interface);
+    if (group) join();
     socket.non_blocking(true);
-    set_options();
+    set_reception(socket.native_handle(), kReceiveBuffer);
 }
 
-// Each is an improvement that reception can do without, so failures are let pass.
-void UdpEndpoint::Impl::set_options() {
-    const int fd = socket.native_handle();
-    const int on = 1;
-    const int size = kReceiveBuffer;
-    if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof(size)) != 0) {
-        setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &size, sizeof(size));  // up to net.core.rmem_max
+void UdpEndpoint::Impl::join() {
+    const ::sockaddr_storage group = storage_of(bound);
+    if (source.empty()) {
+        return join_group(socket.native_handle(), group, interface_number, nullptr);
     }
-    setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on));
-    setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof(on));
+    const udp::endpoint sender = resolve(io, source, 0);
+    if (sender.protocol() != bound.protocol()) {
+        throw ListenError("--source " + source + ": is not of the same family as the group");
+    }
+    const ::sockaddr_storage from = storage_of(sender);
+    join_group(socket.native_handle(), group, interface_number, &from);
 }
 
-void UdpEndpoint::Impl::note_drops(std::uint32_t counter) {
-    drops += static_cast<std::uint32_t>(counter - drops_seen);
-    drops_seen = counter;
-}
-
-// Hands `count` datagrams of the batch to the session, each with the time at which the kernel took
-// it.
-void UdpEndpoint::Impl::take(std::size_t count) {
-    const Time steady = UdpEndpoint::now();
-    const Time wall = wall_clock();
-    for (std::size_t k = 0; k < count; ++k) {
-        Time age{};
-        batch.for_each_control(k, [&](const cmsghdr& control) {
-            if (control.cmsg_level != SOL_SOCKET) return;
-            if (control.cmsg_type == SO_TIMESTAMPNS) {
-                timespec stamp{};
-                std::memcpy(&stamp, CMSG_DATA(&control), sizeof(stamp));
-                age = wall - to_time(stamp);
-            } else if (control.cmsg_type == SO_RXQ_OVFL) {
-                std::uint32_t counter = 0;
-                std::memcpy(&counter, CMSG_DATA(&control), sizeof(counter));
-                note_drops(counter);
-            }
-        });
-        // Bounds for when somebody sets the wall clock between the two.
-        age = std::clamp<Time>(age, Time::zero(), std::chrono::seconds(5));
-        session->on_datagram(advance(steady - age), batch.source(k), batch.bytes(k));
+/// An interface that goes down and comes up keeps its memberships. One that was away, unplugged or
+/// with its driver, is another one to the kernel when it returns, and this socket deaf to it.
+void UdpEndpoint::Impl::follow_interface() {
+    const unsigned number = interface.empty() ? 0 : ::if_nametoindex(interface.c_str());
+    if (number == 0 || number == interface_number) return;
+    const int native = socket.native_handle();
+    try {
+        if (is_bound_to_interface(native)) bind_to_interface(native, interface);
+        if (bound.address().is_multicast()) {
+            leave_group(native, storage_of(bound), interface_number);
+            interface_number = number;
+            join();
+        }
+        interface_number = number;
+        complained = false;
+        spdlog::info("{} is back: listening there again", interface);
+    } catch (const ListenError& error) {
+        interface_number = 0;  // tried again
+        if (!complained) spdlog::warn("{} is back, but: {}", interface, error.what());
+        complained = true;
     }
 }
 
-// False when nothing more waits in the socket.
-bool UdpEndpoint::Impl::drain(int batches) {
-    for (int n = 0; n < batches && !session->finished(); ++n) {
-        const std::size_t count = batch.receive(socket.native_handle());
-        take(count);
-        if (count < kBatch) return false;
-    }
-    return true;
+void UdpEndpoint::Impl::take(std::size_t most) {
+    thread->take(most, [this](const Arrival& arrival) {
+        session->on_datagram(advance(arrival.time), arrival.source, arrival.bytes);
+        return !session->finished();
+    });
 }
 
 void UdpEndpoint::Impl::stop_if_finished() {
     if (session->finished()) io.stop();
 }
 
-void UdpEndpoint::Impl::wait_for_datagrams() {
-    socket.async_wait(udp::socket::wait_read, [this](const error_code& error) {
-        if (error) return;
-        drain(kBatchesPerTurn);
-        stop_if_finished();
-        wait_for_datagrams();
+/// At most one turn is on its way, however many ask for it.
+void UdpEndpoint::Impl::post_turn() {
+    if (turn_posted) return;
+    turn_posted = true;
+    asio::post(io, [this] {
+        turn_posted = false;
+        take_turn();
     });
+}
+
+void UdpEndpoint::Impl::take_turn() {
+    take(kDatagramsPerTurn);
+    const bool more = session->work();
+    if (on_arrival) on_arrival(latest);
+    stop_if_finished();
+    if (session->finished()) return;
+    // What came in the meantime first, that the session can choose.
+    if (thread->unsettled() || more) post_turn();
 }
 
 void UdpEndpoint::Impl::wait_for_tick() {
@@ -250,44 +230,72 @@ void UdpEndpoint::Impl::wait_for_tick() {
         if (error) return;
         // Silence is only what remains when everything that waits was taken: we may have slept, not
         // they.
-        const bool more = drain(kBatchesPerTurn);
-        session->poll(more ? latest : advance(UdpEndpoint::now()));
+        const Time now = UdpEndpoint::now();
+        count_drops();
+        follow_interface();
+        take(kDatagramsPerTurn);
+        session->poll(thread->caught_up() ? advance(now) : latest);
+        if (on_arrival) on_arrival(latest);
         on_tick(latest);
         stop_if_finished();
         wait_for_tick();
     });
 }
 
-UdpEndpoint::UdpEndpoint(const common::Endpoint& listen) : impl_(std::make_unique<Impl>()) {
-    impl_->open(endpoint_of(impl_->io, listen), listen.host.empty());
+void UdpEndpoint::Impl::wait_for_signal() {
+    signals.async_wait([this](const error_code& error, int) {
+        if (error) return;
+        take_what_has_arrived();
+        session->interrupt(advance(UdpEndpoint::now()));
+        stop_if_finished();
+    });
+}
+
+// Before an interrupt: it was received. Of a stream without gaps there is always more.
+void UdpEndpoint::Impl::take_what_has_arrived() {
+    const Time until = UdpEndpoint::now() + kLastTurn;
+    while (!session->finished() && !thread->caught_up() && UdpEndpoint::now() < until) {
+        take(kDatagramsPerTurn);
+        std::this_thread::yield();
+    }
+    while (session->work() && UdpEndpoint::now() < until) {
+    }
+}
+
+// The kernel counts modulo 2^32.
+void UdpEndpoint::Impl::count_drops() {
+    std::array<std::uint32_t, SK_MEMINFO_VARS> info{};
+    socklen_t size = sizeof(info);
+    if (getsockopt(socket.native_handle(), SOL_SOCKET, SO_MEMINFO, info.data(), &size) == 0 &&
+        size > SK_MEMINFO_DROPS * sizeof(std::uint32_t)) {
+        drops += info[SK_MEMINFO_DROPS] - static_cast<std::uint32_t>(drops);
+    }
+}
+
+UdpEndpoint::UdpEndpoint(const ListenOptions& options) : impl_(std::make_unique<Impl>()) {
+    impl_->open(options);
     impl_->signals.add(SIGINT);
     impl_->signals.add(SIGTERM);
 }
 
 UdpEndpoint::~UdpEndpoint() = default;
 
-void UdpEndpoint::run(Session& session, const std::function<void(Time)>& on_tick) {
+void UdpEndpoint::run(Session& session, const std::function<void(Time)>& on_tick,
+                      const std::function<void(Time)>& on_arrival) {
     Impl& impl = *impl_;
     impl.session = &session;
     impl.on_tick = on_tick;
-    impl.signals.async_wait([&impl](const error_code& error, int) {
-        if (error) return;
-        impl.drain(kBatchesPerTurn);  // what has arrived was received
-        impl.session->interrupt(impl.advance(UdpEndpoint::now()));
-        impl.stop_if_finished();
-    });
-    impl.wait_for_datagrams();
-    impl.wait_for_tick();
-    impl.io.run();
-
-    // Drops after the last datagram were announced by none; this is the same counter.
-    std::array<std::uint32_t, SK_MEMINFO_VARS> info{};
-    socklen_t size = sizeof(info);
-    const int fd = impl.socket.native_handle();
-    if (getsockopt(fd, SOL_SOCKET, SO_MEMINFO, info.data(), &size) == 0 &&
-        size > SK_MEMINFO_DROPS * sizeof(std::uint32_t)) {
-        impl.note_drops(info[SK_MEMINFO_DROPS]);
+    impl.on_arrival = on_arrival;
+    {
+        ReceiveThread thread(impl.socket.native_handle(),
+                             [&impl] { asio::post(impl.io, [&impl] { impl.post_turn(); }); });
+        impl.thread = &thread;
+        impl.wait_for_signal();
+        impl.wait_for_tick();
+        impl.io.run();
     }
+    impl.thread = nullptr;
+    impl.count_drops();
 }
 
 std::string UdpEndpoint::address() const {
@@ -305,6 +313,20 @@ std::size_t UdpEndpoint::receive_buffer() const {
 
 std::uint64_t UdpEndpoint::kernel_dropped() const {
     return impl_->drops;
+}
+
+void UdpEndpoint::tell_local(const std::string& socket, std::string_view lines) {
+    sockaddr_un address{};
+    if (socket.empty() || socket.size() >= sizeof address.sun_path) return;
+    address.sun_family = AF_UNIX;
+    std::copy(socket.begin(), socket.end(), address.sun_path);
+    if (socket[0] == '@') address.sun_path[0] = '\0';  // Linux's abstract namespace
+    const int descriptor = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (descriptor < 0) return;
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket.size());
+    (void)::sendto(descriptor, lines.data(), lines.size(), MSG_NOSIGNAL,
+                   reinterpret_cast<const sockaddr*>(&address), length);
+    ::close(descriptor);
 }
 
 }  // namespace ellicast::receiver

@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "common/text_values.hpp"
 #include "receiver/arrival.hpp"
@@ -20,6 +21,13 @@ class ListenError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// Where to listen.
+struct ListenOptions {
+    common::Endpoint listen{};  // a multicast group is joined; an empty host is any address
+    std::string interface {};   // by name; empty: all, and for a group the system's choice
+    std::string source{};       // address: of a group, what it sends alone (RFC 4607); empty: all
+};
+
 /// A bound UDP socket, and the loop that feeds a session from it. The receiver's only contact with
 /// the network and its clock. While it lives, SIGINT and SIGTERM end reception instead of the
 /// program.
@@ -27,24 +35,30 @@ class UdpEndpoint {
   public:
     /// Binds; from then on nothing that arrives is missed. An empty host is any address, IPv4 and
     /// IPv6 at once. Throws ListenError.
-    explicit UdpEndpoint(const common::Endpoint& listen);
+    explicit UdpEndpoint(const ListenOptions& options);
     ~UdpEndpoint();
     UdpEndpoint(const UdpEndpoint&) = delete;
     UdpEndpoint& operator=(const UdpEndpoint&) = delete;
 
     /// Feeds the session until it is finished, by itself or by a signal. Calls on_tick(now) about
-    /// ten times a second. Datagrams bear the time at which the kernel took them.
-    void run(Session& session, const std::function<void(Time)>& on_tick);
+    /// ten times a second, and on_arrival(now), where given, after every few datagrams too.
+    /// Datagrams bear the time at which the kernel took them.
+    void run(Session& session, const std::function<void(Time)>& on_tick,
+             const std::function<void(Time)>& on_arrival = {});
 
     /// As bound: "[::]:5004".
     [[nodiscard]] std::string address() const;
     /// What the kernel granted; bytes, its own overhead included.
     [[nodiscard]] std::size_t receive_buffer() const;
-    /// Datagrams that found the socket's buffer full.
+    /// Datagrams that found the socket's buffer full; up to date to a tenth of a second.
     [[nodiscard]] std::uint64_t kernel_dropped() const;
 
     /// The clock of all sessions fed here.
     static Time now();
+
+    /// Sends a datagram to a local socket, by path or '@' and a name; common::ServiceNotification's
+    /// way out. Whoever does not listen is not told.
+    static void tell_local(const std::string& socket, std::string_view lines);
 
   private:
     struct Impl;

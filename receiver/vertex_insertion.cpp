@@ -2,15 +2,11 @@
 #include "receiver/vertex_insertion.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numeric>
 #include <tuple>
 
-#include "common/parallel.hpp"
-#include "common/triangle_tree.hpp"
+#include "receiver/closest_triangles.hpp"
 #include "receiver/edge_flips.hpp"
+#include "receiver/surface_walk.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -23,9 +19,6 @@ constexpr double kEdgeCoordinate = 0.02;
 // Above this one the projection is as good as the corner.
 constexpr double kCornerCoordinate = 0.9;
 constexpr double kSamePointCoordinate = 0.999;
-// Steps of the walk before the search falls back on what it has: the start is next to the goal.
-constexpr int kMaxWalk = 64;
-
 struct Target {
     std::uint32_t point;
     FaceId face;  // of the surface at entry
@@ -34,31 +27,21 @@ struct Target {
 
 std::vector<Target> project(const PointSurface& surface, std::span<const Vector3d> points,
                             std::span<const std::uint32_t> chosen, unsigned threads) {
-    // The tree numbers live faces; `slot` leads back.
+    // The extracted mesh numbers live faces; `slot` leads back.
     std::vector<FaceId> slot;
     for (FaceId f = 0; f < surface.mesh.face_slots(); ++f) {
         if (surface.mesh.face_alive(f)) slot.push_back(f);
     }
-    const common::TriangleTree tree(surface.mesh.extract());
+    std::vector<Vector3d> positions(chosen.size());
+    std::transform(chosen.begin(), chosen.end(), positions.begin(),
+                   [&](std::uint32_t point) { return points[point]; });
     std::vector<Target> targets(chosen.size());
-    common::parallel_for(chosen.size(), threads, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const common::TriangleTree::Hit hit = tree.closest(points[chosen[i]]);
-            targets[i] = {chosen[i], slot[hit.triangle], hit.point};
-        }
-    });
-    // Face slots run in grid order, so neighbours in this order are neighbours on the surface.
-    std::sort(targets.begin(), targets.end(), [](const Target& a, const Target& b) {
-        return std::tie(a.face, a.point) < std::tie(b.face, b.point);
-    });
+    visit_closest_triangles(surface.mesh.extract(), positions, threads,
+                            [&](std::size_t i, const common::TriangleTree::Hit& hit) {
+                                targets[i] = {chosen[i], slot[hit.triangle], hit.point};
+                            });
     return targets;
 }
-
-struct Place {
-    FaceId face = kNone;
-    Vector3d barycentric = Vector3d::Zero();
-    double squared_distance = std::numeric_limits<double>::infinity();
-};
 
 class Inserter {
   public:
@@ -66,7 +49,7 @@ class Inserter {
 
     // True when the point is a vertex now.
     bool insert(const Target& target) {
-        const Place place = locate(target);
+        const SurfacePlace place = walk_to_closest(mesh_, target.face, target.at);
         const auto corners = mesh_.face(place.face);
         int largest = 0;
         place.barycentric.maxCoeff(&largest);
@@ -87,48 +70,7 @@ class Inserter {
     }
 
   private:
-    [[nodiscard]] Place measure(FaceId f, const Vector3d& x) const {
-        const auto [a, b, c] = mesh_.face(f);
-        const common::TrianglePoint hit = common::closest_point_on_triangle(
-            x, mesh_.position(a), mesh_.position(b), mesh_.position(c));
-        return {f, hit.barycentric, (x - hit.point).squaredNorm()};
-    }
-
-    // Steps to the neighbour beyond the edge that separates x most, while that brings it closer.
-    [[nodiscard]] Place locate(const Target& target) const {
-        Place best = measure(target.face, target.at);
-        for (int step = 0; step < kMaxWalk; ++step) {
-            Place next = best;
-            for (unsigned corner = 0; corner < 3; ++corner) {
-                // The closest point lies on the edge opposite a corner of weight zero.
-                if (best.barycentric[static_cast<int>((corner + 2) % 3)] > 0.0) continue;
-                const HalfedgeId h = SurfaceMesh::halfedge(best.face, corner);
-                const Place beyond = measure(SurfaceMesh::face_of(mesh_.twin(h)), target.at);
-                if (beyond.squared_distance < next.squared_distance) next = beyond;
-            }
-            if (next.face == best.face) {
-                next = best_around_corner(best, target.at);
-                if (next.face == best.face) break;
-            }
-            best = next;
-        }
-        return best;
-    }
-
-    // When the closest point is a corner, the way on may lead through any face at that corner.
-    [[nodiscard]] Place best_around_corner(const Place& place, const Vector3d& x) const {
-        int largest = 0;
-        if (place.barycentric.maxCoeff(&largest) < 1.0) return place;
-        Place best = place;
-        const VertexId v = mesh_.face(place.face)[static_cast<std::size_t>(largest)];
-        mesh_.for_each_outgoing(v, [&](HalfedgeId h) {
-            const Place here = measure(SurfaceMesh::face_of(h), x);
-            if (here.squared_distance < best.squared_distance) best = here;
-        });
-        return best;
-    }
-
-    VertexId split(const Place& place, const Vector3d& at) {
+    VertexId split(const SurfacePlace& place, const Vector3d& at) {
         int smallest = 0;
         if (place.barycentric.minCoeff(&smallest) < kEdgeCoordinate) {
             const auto corner = static_cast<unsigned>((smallest + 1) % 3);
@@ -167,9 +109,16 @@ class Inserter {
 
 std::vector<std::uint32_t> insert_points(PointSurface& surface, std::span<const Vector3d> points,
                                          std::span<const std::uint32_t> chosen, unsigned threads) {
+    std::vector<Target> targets = project(surface, points, chosen, threads);
+    // Face slots run in grid order, so neighbours in this order are neighbours on the surface.
+    std::sort(targets.begin(), targets.end(), [](const Target& a, const Target& b) {
+        return std::tie(a.face, a.point) < std::tie(b.face, b.point);
+    });
+    surface.mesh.reserve(targets.size());
+    surface.point_of_vertex.reserve(surface.point_of_vertex.size() + targets.size());
     std::vector<std::uint32_t> left_out;
     Inserter inserter(surface);
-    for (const Target& target : project(surface, points, chosen, threads)) {
+    for (const Target& target : targets) {
         if (!inserter.insert(target)) left_out.push_back(target.point);
     }
     std::sort(left_out.begin(), left_out.end());

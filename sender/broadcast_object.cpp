@@ -8,12 +8,16 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "common/diagonal_choice.hpp"
 #include "common/object_id.hpp"
 #include "common/random.hpp"
 #include "protocol/object_table.hpp"
+#include "sender/costly_edges.hpp"
+#include "sender/diagonal_marks.hpp"
 #include "sender/diagonal_rule.hpp"
+#include "sender/equal_positions.hpp"
 #include "sender/importance_order.hpp"
 #include "sender/spread_order.hpp"
 #include "sender/surface_decimation.hpp"
@@ -79,24 +83,6 @@ protocol::EllipsoidRecord ellipsoid_record(const common::Ellipsoid& ellipsoid,
     return record;
 }
 
-/// Of each record the first that is equal to it (0 and -0 are equal).
-std::vector<std::uint32_t> first_equals(const std::vector<protocol::VertexRecord>& records) {
-    std::vector<std::uint32_t> by_position(records.size());
-    std::iota(by_position.begin(), by_position.end(), 0u);
-    std::sort(by_position.begin(), by_position.end(), [&](std::uint32_t a, std::uint32_t b) {
-        const auto& p = records[a].position;
-        const auto& q = records[b].position;
-        return p != q ? p < q : a < b;
-    });
-    std::vector<std::uint32_t> first(records.size());
-    for (std::size_t k = 0; k < records.size(); ++k) {
-        const std::uint32_t index = by_position[k];
-        const bool equal = k > 0 && records[by_position[k - 1]] == records[index];
-        first[index] = equal ? first[by_position[k - 1]] : index;
-    }
-    return first;
-}
-
 std::vector<Eigen::Vector3d> positions_of(const std::vector<protocol::VertexRecord>& records) {
     std::vector<Eigen::Vector3d> positions;
     positions.reserve(records.size());
@@ -106,19 +92,21 @@ std::vector<Eigen::Vector3d> positions_of(const std::vector<protocol::VertexReco
     return positions;
 }
 
-std::vector<protocol::VertexRecord> picked(const std::vector<protocol::VertexRecord>& records,
-                                           const std::vector<std::uint32_t>& indices) {
-    std::vector<protocol::VertexRecord> result;
+template <class Item>
+std::vector<Item> picked(const std::vector<Item>& items,
+                         const std::vector<std::uint32_t>& indices) {
+    std::vector<Item> result;
     result.reserve(indices.size());
-    for (const std::uint32_t index : indices) result.push_back(records[index]);
+    for (const std::uint32_t index : indices) result.push_back(items[index]);
     return result;
 }
 
 /// The vertices' own indices by descending importance, backwards through the decimation of the
 /// solid. Where the solid has copies of a vertex, the most important one counts.
 std::vector<std::uint32_t> by_importance(const PreparedModel& model,
-                                         const std::vector<std::uint32_t>& first_equal) {
-    std::vector<std::uint32_t> removed = removal_order(model.solid);
+                                         const std::vector<std::uint32_t>& first_equal,
+                                         unsigned threads) {
+    std::vector<std::uint32_t> removed = removal_order(model.solid, threads);
     std::reverse(removed.begin(), removed.end());
     std::vector<bool> taken(model.vertices.size(), false);
     std::vector<std::uint32_t> ranking;
@@ -132,7 +120,7 @@ std::vector<std::uint32_t> by_importance(const PreparedModel& model,
     return ranking;
 }
 
-/// The records of the model's vertices, one each, and of the solid's others behind them.
+/// What becomes of the solid's positions: those of the model's vertices come first.
 std::vector<protocol::VertexRecord> solid_records(const PreparedModel& model,
                                                   const std::array<double, 3>& origin) {
     std::vector<protocol::VertexRecord> records;
@@ -143,21 +131,86 @@ std::vector<protocol::VertexRecord> solid_records(const PreparedModel& model,
     return records;
 }
 
-/// Equal records of the model's vertices once, in the order asked for.
-std::vector<protocol::VertexRecord> ordered_records(const PreparedModel& model,
-                                                    std::vector<protocol::VertexRecord> records,
-                                                    const ObjectOptions& options) {
-    const std::vector<std::uint32_t> first_equal = first_equals(records);
+/// Of the model's vertices with equal records the first ones, in the order asked for.
+std::vector<std::uint32_t> ordered_vertices(const PreparedModel& model,
+                                            const std::vector<protocol::VertexRecord>& records,
+                                            const std::vector<std::uint32_t>& first_equal,
+                                            const ObjectOptions& options) {
+    std::vector<std::uint32_t> vertices;
     if (options.order == SendingOrder::importance) {
-        records = picked(records, by_importance(model, first_equal));
-        return picked(records, spread_within_strata(positions_of(records), options.seed));
+        vertices = by_importance(model, first_equal, options.threads);
+    } else {
+        for (std::uint32_t v = 0; v < model.vertices.size(); ++v) {
+            if (first_equal[v] == v) vertices.push_back(v);
+        }
     }
-    std::vector<std::uint32_t> distinct;
-    for (std::uint32_t k = 0; k < model.vertices.size(); ++k) {
-        if (first_equal[k] == k) distinct.push_back(k);
+    const std::vector<Eigen::Vector3d> positions = positions_of(picked(records, vertices));
+    return picked(vertices, options.order == SendingOrder::importance
+                                ? spread_within_strata(positions, options.seed)
+                                : spread_order(positions, options.seed));
+}
+
+// Strata below are too coarse for a mesh, and above the decimation takes its time.
+constexpr std::uint32_t kSmallestLevel = 512;
+constexpr std::uint32_t kLargestWithLevels = 1u << 18;
+
+/// `record_of`: by position of the solid.
+std::vector<protocol::EdgeRecord> edges_worth_telling(const PreparedModel& model,
+                                                      const std::vector<std::uint32_t>& record_of,
+                                                      const BroadcastObject& object,
+                                                      unsigned threads) {
+    const auto vertices = static_cast<std::uint32_t>(object.vertices.size());
+    common::TriangleMesh surface{positions_of(object.vertices), {}};
+    std::vector<std::uint32_t> place = record_of;
+    for (std::size_t v = model.vertices.size(); v < place.size(); ++v) {  // the centres of caps
+        place[v] = static_cast<std::uint32_t>(surface.positions.size());
+        surface.positions.push_back(
+            model.solid.positions[v] -
+            Eigen::Map<const Eigen::Vector3d>(object.description.origin.data()));
     }
-    records = picked(records, distinct);
-    return picked(records, spread_order(positions_of(records), options.seed));
+    surface.triangles.reserve(model.solid.triangles.size());
+    for (const common::Triangle& t : model.solid.triangles) {
+        const common::Triangle here{place[t[0]], place[t[1]], place[t[2]]};
+        if (here[0] != here[1] && here[1] != here[2] && here[2] != here[0]) {
+            surface.triangles.push_back(here);
+        }
+    }
+    CostlyEdgeOptions options;
+    options.threads = threads;
+    options.normal_bits = object.hint.format.normal_bits;
+    options.diagonal_rule = object.hint.diagonals;
+    if (object.order == SendingOrder::importance && vertices <= kLargestWithLevels) {
+        for (const std::uint32_t end : importance_strata(vertices)) {
+            if (end >= kSmallestLevel && end < vertices) options.levels.push_back(end);
+        }
+    }
+    options.levels.push_back(vertices);
+    return costly_edges(std::move(surface), vertices, options);
+}
+
+/// Fills the object's records of vertices, and its edges. Requires format and rule for diagonals.
+void set_vertices(BroadcastObject& object, const PreparedModel& model,
+                  const ObjectOptions& options) {
+    const std::vector<protocol::VertexRecord> records =
+        solid_records(model, object.description.origin);
+    std::vector<std::uint32_t> record_of = first_equals(records.size(), [&](std::size_t k) {
+        const auto& [x, y, z] = records[k].position;
+        return std::array<double, 3>{x, y, z};
+    });
+    const std::vector<std::uint32_t> vertices =
+        ordered_vertices(model, records, record_of, options);
+    object.vertices = picked(records, vertices);
+    std::vector<std::uint32_t> rank(records.size(), 0);
+    for (std::uint32_t k = 0; k < vertices.size(); ++k) rank[vertices[k]] = k;
+    for (std::uint32_t& v : record_of) v = rank[v];
+    std::vector<char> marks;
+    const int normal_bits = object.hint.format.normal_bits;
+    if (normal_bits > 0) {
+        marks = diagonal_marks(model.solid, normal_bits, object.hint.diagonals, options.threads);
+    }
+    set_tags(object.hint.format, model, record_of, marks, object.vertices);
+    if (options.tags.edges)
+        object.edges = edges_worth_telling(model, record_of, object, options.threads);
 }
 
 /// The box of the records themselves: rounding happened before, so it holds every one of them
@@ -206,15 +259,13 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     }
     const std::array<double, 3>& origin = object.description.origin;
 
-    std::vector<protocol::VertexRecord> records = solid_records(model, origin);
-    object.vertices = ordered_records(model, records, options);
     object.order = options.order;
-    records.resize(model.vertices.size());
     object.hint.format = record_format(options.tags, model);
-    set_tags(object.hint.format, model, records, object.vertices);
     static_assert(common::kDiagonalRules == protocol::kDiagonalRules);
     object.hint.by_importance = options.order == SendingOrder::importance;
-    object.hint.diagonals = best_diagonal_rule(model.solid, object.hint.format.normal_bits);
+    object.hint.diagonals =
+        best_diagonal_rule(model.solid, object.hint.format.normal_bits, options.threads);
+    set_vertices(object, model, options);
 
     object.hint.components = promise.components;
     object.hint.euler_all = promise.euler_all;

@@ -26,6 +26,7 @@ struct BroadcastObject {
     protocol::Description description;
     std::vector<protocol::EllipsoidRecord> ellipsoids;  // order of selection
     std::vector<protocol::VertexRecord> vertices;       // in the order of `order`
+    std::vector<protocol::EdgeRecord> edges;            // in the order of sending
     SendingOrder order = SendingOrder::importance;
 };
 
@@ -34,15 +35,17 @@ struct ObjectOptions {
     std::uint64_t seed = 1;
     TagOptions tags{};
     SendingOrder order = SendingOrder::importance;
+    unsigned threads = 0;  // 0: one per core; does not change the result
 };
 
 /// Turns geometry into records: subtracts the origin (zero unless the box lies far from it; chosen
 /// so that float32 input survives bit for bit), rounds to float32, merges vertices that become
 /// equal, orders the vertices (removal_order() backwards and spread_within_strata(), or
-/// spread_order()), gives them their tags, drops ellipsoids that no receiver would accept, fills
-/// hint, id and description. The hinted box is that of the rounded records. Throws
-/// std::invalid_argument with a one-line reason when no vertex or no ellipsoid remains, or when
-/// size, counts or topology exceed what the wire can say.
+/// spread_order()), gives them their tags, finds the costly_edges() (by importance: of
+/// every stratum of at least 512 vertices too, on models of at most 2^18), drops ellipsoids that no
+/// receiver would accept, fills hint, id and description. The hinted box is that of the rounded
+/// records. Throws std::invalid_argument with a one-line reason when no vertex or no ellipsoid
+/// remains, or when size, counts or topology exceed what the wire can say.
 BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
                             const Decomposition& decomposition, const ObjectOptions& options);
 

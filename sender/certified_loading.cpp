@@ -4,10 +4,12 @@
 #include <array>
 #include <bit>
 #include <fstream>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include "common/atomic_file.hpp"
+#include "common/hex_text.hpp"
 #include "common/number_text.hpp"
 #include "common/object_id.hpp"
 
@@ -57,13 +59,7 @@ std::string certificate_key(const BroadcastObject& object, const PlanOptions& pl
         digest.update(round.datagram(0, ordinal, {}));
     }
     const std::array<std::uint8_t, 32> sum = digest.finish32();
-    constexpr std::string_view kDigits = "0123456789abcdef";
-    std::string hex;
-    for (std::size_t i = 0; i < 16; ++i) {
-        hex.push_back(kDigits[sum[i] >> 4]);
-        hex.push_back(kDigits[sum[i] & 15]);
-    }
-    return hex;
+    return common::hex_text(std::span(sum).first(16));
 }
 
 void write_certificate(const fs::path& path, const std::string& key,

@@ -8,9 +8,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/morton_order.hpp"
 #include "common/parallel.hpp"
 #include "common/random.hpp"
 #include "common/solid_voxels.hpp"
+#include "sender/clustered_surface.hpp"
 #include "sender/constraint_tree.hpp"
 #include "sender/ellipsoid_growth.hpp"
 #include "sender/ellipsoid_refinement.hpp"
@@ -61,38 +63,13 @@ GrowthInput prepare_growth(const TriangleMesh& unit, const DecompositionOptions&
             std::move(surface), growth};
 }
 
-// Order of the seeds along a Morton curve, so that a growth's contacts are good guesses for the
-// next.
-std::vector<std::uint32_t> spatial_order(const std::vector<Vector3d>& points) {
-    const auto spread = [](std::uint64_t v) {  // two zero bits behind each of 10 bits
-        v = (v | (v << 16)) & 0x030000ffu;
-        v = (v | (v << 8)) & 0x0300f00fu;
-        v = (v | (v << 4)) & 0x030c30c3u;
-        return (v | (v << 2)) & 0x09249249u;
-    };
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
-    keys.reserve(points.size());
-    for (std::uint32_t i = 0; i < points.size(); ++i) {
-        std::uint64_t key = 0;
-        for (Eigen::Index axis = 0; axis < 3; ++axis) {
-            const double cell = std::clamp((points[i][axis] + 0.5) * 1024.0, 0.0, 1023.0);
-            key |= spread(static_cast<std::uint64_t>(cell)) << axis;
-        }
-        keys.emplace_back(key, i);
-    }
-    std::sort(keys.begin(), keys.end());
-    std::vector<std::uint32_t> order;
-    order.reserve(keys.size());
-    for (const auto& [key, index] : keys) order.push_back(index);
-    return order;
-}
-
 // One result a seed, in seed order.
 std::vector<std::optional<Ellipsoid>> grow_all(const GrowthInput& input, unsigned threads) {
     // Guesses pass from seed to seed inside a block, never across, so that what a seed sees does
     // not depend on the number of threads.
     constexpr std::size_t kBlock = 64;
-    const std::vector<std::uint32_t> order = spatial_order(input.seeds.points);
+    // Neighbours follow each other, so that a growth's contacts are good guesses for the next.
+    const std::vector<std::uint32_t> order = common::morton_order(input.seeds.points);
     const std::size_t blocks = (order.size() + kBlock - 1) / kBlock;
     std::vector<std::optional<Ellipsoid>> grown(order.size());
     common::parallel_for(blocks, threads, [&](std::size_t first, std::size_t last) {
@@ -183,6 +160,16 @@ std::vector<std::uint32_t> with_the_rest(std::vector<std::uint32_t> order, std::
     return order;
 }
 
+// The surface that ellipsoids grow inside and are refined to: the solid's own, or of a huge one no
+// more than shows at their scale. A cluster is a quarter of a receiver's cell.
+TriangleMesh fitted_surface(const TriangleMesh& solid) {
+    constexpr std::size_t kMostTriangles = 1u << 20;
+    constexpr double kCluster = 1.0 / 512;  // of the diagonal
+    if (solid.triangles.size() <= kMostTriangles) return solid;
+    const double diagonal = common::bounding_box(solid.positions).diagonal().stableNorm();
+    return clustered_surface(solid, kCluster * diagonal);
+}
+
 // Whether there is a frame to compute in: not for the empty mesh, nor for one single point.
 bool has_extent(const TriangleMesh& mesh) {
     const Eigen::AlignedBox3d box = common::bounding_box(mesh.positions);
@@ -195,7 +182,7 @@ std::vector<Ellipsoid> grow_candidates(const TriangleMesh& solid,
                                        const DecompositionOptions& options) {
     if (!has_extent(solid)) return {};
     const UnitFrame frame(solid.positions);
-    const TriangleMesh unit = frame.to_unit(solid);
+    const TriangleMesh unit = frame.to_unit(fitted_surface(solid));
     const Eigen::AlignedBox3d box = common::bounding_box(unit.positions);
     std::vector<Ellipsoid> candidates;
     for (const std::optional<Ellipsoid>& grown :
@@ -226,7 +213,7 @@ Decomposition select_ellipsoids(const std::vector<Ellipsoid>& candidates, const 
         refinement.loss = rule.loss / 3.0;
         refinement.threads = options.threads;
         const std::vector<Ellipsoid> refined =
-            refine_ellipsoids(decomposition.ellipsoids, solid, refinement);
+            refine_ellipsoids(decomposition.ellipsoids, fitted_surface(solid), refinement);
         selection = select_greedily(refined, voxels.frame, voxels.solid, rule);
         decomposition.ellipsoids = taken(refined, with_the_rest(selection.order, refined.size()));
     }

@@ -46,11 +46,12 @@ struct Decomposition {
 
 /// [BK02] section 3, whole: presmoothing, surface seeds, growth sphere -> alpha -> beta with
 /// epsilon, and selection; then the selected are refined (ellipsoid_refinement.hpp) and ordered
-/// anew by the same rule. `solid` is closed and outward oriented (PreparedModel::solid). Results
-/// are in its frame and unit; inside, everything is scaled to a bounding-box diagonal of 1. Fewer
-/// than options.ellipsoids come back only when no candidate adds anything. Same solid, options:
-/// same bits, on any number of threads. Throws std::invalid_argument when not a single ellipsoid
-/// grows.
+/// anew by the same rule. A solid of more than 2^20 triangles is clustered to a 512th of the
+/// diagonal for growth and refinement. `solid` is closed and outward oriented
+/// (PreparedModel::solid). Results are in its frame and unit; inside, everything is scaled to a
+/// bounding-box diagonal of 1. Fewer than options.ellipsoids come back only when no candidate adds
+/// anything. Same solid, options: same bits, on any number of threads. Throws std::invalid_argument
+/// when not a single ellipsoid grows.
 Decomposition decompose(const common::TriangleMesh& solid, const DecompositionOptions& options);
 
 /// The two halves of decompose, for measuring and for the cache's tests.

@@ -21,6 +21,7 @@
 #include <system_error>
 
 #include "common/atomic_file.hpp"
+#include "common/hex_text.hpp"
 #include "common/model_io.hpp"
 #include "common/object_id.hpp"
 #include "sender/decomposition.hpp"
@@ -32,11 +33,11 @@ using common::Ellipsoid;
 
 // Part of the key as well: counts up when the file's layout or the result of decompose() changes,
 // so that a newer program does not serve an older one's work.
-constexpr std::uint8_t kVersion = 2;
+constexpr std::uint8_t kVersion = 3;
 constexpr std::string_view kMagic = "ellidec";
 constexpr std::size_t kKeyBytes = 32;
-constexpr std::size_t kHeaderBytes = 8 + kKeyBytes + 5 * 8;
-constexpr std::size_t kEllipsoidBytes = 9 * 8;
+constexpr std::size_t kHeaderBytes = 8 + kKeyBytes + 5 * sizeof(std::uint64_t);
+constexpr std::size_t kEllipsoidBytes = 9 * sizeof(double);
 constexpr std::size_t kChecksumBytes = 32;
 constexpr std::uint64_t kMaxEllipsoids = 1u << 20;  // 75 MB; senders have at most 65535
 
@@ -200,13 +201,7 @@ std::string decomposition_key(const common::TriangleMesh& solid,
         for (const std::uint32_t corner : t) out.u64(corner);
     });
     const std::array<std::uint8_t, 32> sum = digest.finish32();
-    constexpr std::string_view kDigits = "0123456789abcdef";
-    std::string hex;
-    for (std::size_t i = 0; i < kKeyBytes / 2; ++i) {
-        hex.push_back(kDigits[sum[i] >> 4]);
-        hex.push_back(kDigits[sum[i] & 15]);
-    }
-    return hex;
+    return common::hex_text(std::span(sum).first(kKeyBytes / 2));
 }
 
 void write_decomposition(const std::filesystem::path& path, const std::string& key,

@@ -32,15 +32,17 @@ inline std::uint32_t target(const std::vector<common::Triangle>& triangles, Half
 /// Items put into buckets by a key in [0, keys): a counting sort, linear and stable.
 struct Buckets {
     std::vector<std::uint32_t> items;
-    std::vector<std::size_t> first;  // keys + 1 offsets into items
+    std::vector<std::uint32_t> first;  // keys + 1 offsets into items
 
     template <class Key>
-    Buckets(std::size_t count, std::size_t keys, const Key& key) : items(count), first(keys + 1) {
-        for (std::size_t i = 0; i < count; ++i) ++first[key(i) + 1];
-        for (std::size_t k = 0; k < keys; ++k) first[k + 1] += first[k];
-        std::vector<std::size_t> next(first.begin(), first.end() - 1);
-        for (std::size_t i = 0; i < count; ++i)
-            items[next[key(i)]++] = static_cast<std::uint32_t>(i);
+    Buckets(std::size_t count, std::size_t keys, const Key& key) : items(count), first(keys + 2) {
+        // Two places ahead: then filling the buckets leaves the offsets where they belong.
+        for (std::size_t i = 0; i < count; ++i) ++first[key(i) + 2];
+        for (std::size_t k = 2; k < first.size(); ++k) first[k] += first[k - 1];
+        for (std::size_t i = 0; i < count; ++i) {
+            items[first[key(i) + 1]++] = static_cast<std::uint32_t>(i);
+        }
+        first.pop_back();
     }
     std::span<std::uint32_t> bucket(std::size_t key) {
         return std::span(items).subspan(first[key], first[key + 1] - first[key]);
@@ -57,20 +59,20 @@ void for_each_edge(const std::vector<common::Triangle>& triangles, std::size_t v
         const auto half = static_cast<HalfEdge>(h);
         return std::min(origin(triangles, half), target(triangles, half));
     };
-    const auto upper = [&](HalfEdge h) {
-        return std::max(origin(triangles, h), target(triangles, h));
-    };
     Buckets by_lower(3 * triangles.size(), vertices, lower);
+    std::vector<std::uint64_t> keys;  // upper end << 32 | half-edge
     for (std::size_t v = 0; v < vertices; ++v) {
-        std::span<HalfEdge> rest = by_lower.bucket(v);
-        std::sort(rest.begin(), rest.end(), [&](HalfEdge a, HalfEdge b) {
-            return upper(a) != upper(b) ? upper(a) < upper(b) : a < b;
-        });
-        while (!rest.empty()) {
-            std::size_t n = 1;
-            while (n < rest.size() && upper(rest[n]) == upper(rest[0])) ++n;
-            visit(std::span<const HalfEdge>(rest.first(n)));
-            rest = rest.subspan(n);
+        const std::span<HalfEdge> edges = by_lower.bucket(v);
+        keys.clear();
+        for (const HalfEdge h : edges) {
+            const std::uint32_t upper = std::max(origin(triangles, h), target(triangles, h));
+            keys.push_back(std::uint64_t{upper} << 32 | h);
+        }
+        std::sort(keys.begin(), keys.end());
+        for (std::size_t k = 0; k < keys.size(); ++k) edges[k] = static_cast<HalfEdge>(keys[k]);
+        for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
+            while (end < keys.size() && keys[end] >> 32 == keys[begin] >> 32) ++end;
+            visit(std::span<const HalfEdge>(edges.subspan(begin, end - begin)));
         }
     }
 }

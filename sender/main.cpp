@@ -6,8 +6,10 @@
 #include <cstdio>
 #include <exception>
 #include <stdexcept>
+#include <string_view>
 #include <variant>
 
+#include "sender/key_command.hpp"
 #include "sender/options.hpp"
 #include "sender/program.hpp"
 
@@ -43,15 +45,16 @@ Identity identity_of(const FixedIdentity& fixed) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    // A model of this name is ./key.
+    if (argc > 1 && std::string_view(argv[1]) == "key") return run_key_command(argc - 1, argv + 1);
     const std::variant<Options, int> parsed = parse_options(argc, argv);
     if (const int* const code = std::get_if<int>(&parsed)) return *code;
     const Options& options = std::get<Options>(parsed);
     try {
         set_up_log(options);
-        run(options, identity_of(options.identity));
-    } catch (const std::exception& error) {  // SendError, ModelError: the user's; else: ours
+        return static_cast<int>(run(options, identity_of(options.identity)));
+    } catch (const std::exception& error) {  // SendError, ModelError, KeyError: the user's
         std::fprintf(stderr, "ellicast-send: %s\n", error.what());
-        return 2;
+        return static_cast<int>(ExitCode::usage);
     }
-    return 0;
 }

@@ -93,7 +93,7 @@ LoadedModel load_model(const fs::path& path, const DecompositionOptions& options
     loaded.object = timed(loaded.stages, "object", [&] {
         return naming(path, [&] {
             return make_object(source.model, loaded.promise, source.decomposition,
-                               {path.stem().string(), options.seed, tags, order});
+                               {path.stem().string(), options.seed, tags, order, options.threads});
         });
     });
     if (loaded.promise.approximate) {

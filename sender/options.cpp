@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "common/hex_text.hpp"
 #include "common/loss_options.hpp"
 #include "common/number_text.hpp"
 #include "common/text_values.hpp"
@@ -19,30 +20,43 @@ Examples:
       one round at 20 Mbit/s to port 5004
   ellicast-send horse.ply --to [2001:db8::7]:6000 --rate 2M --rounds forever
       a slow carousel, until Ctrl-C
+  ellicast-send horse.ply --to 239.255.0.1 --interface eth0 --ttl 4 --rounds forever
+      to everybody who has joined the group, over up to three routers
   ellicast-send horse.ply bunny.obj --to 192.0.2.7 --cache ~/.cache/ellicast
       two models, one after the other; the next start streams at once
+  ellicast-send a.ply b.obj c.stl --to 192.0.2.7 --rounds forever --status now.json
+      a carousel of three pages; a file that changes becomes a new version of its page
+  ellicast-send horse.ply --to 239.255.0.1 --rounds forever --sdp horse.sdp
+      describe the stream in a file that says where to listen (ellicast-recv --sdp horse.sdp)
   ellicast-send horse.ply --to 127.0.0.1 --drop 0.3 --loss-seed 7 --report sent.json
       lose three datagrams in ten on purpose, after numbering
   ellicast-send horse.ply --to 192.0.2.7 --redundancy 1.5
       half as many bytes again, for second copies of the vertices that matter most
   ellicast-send horse.ply --to 192.0.2.7 --order spread
       the vertices evenly instead of the most important first
+  ellicast-send key --output studio && ellicast-send horse.ply --to 192.0.2.7 --sign studio
+      make a pair of keys, and sign every datagram (ellicast-recv --verify studio.pub)
   ellicast-send horse.ply --decompose-only horse.ellipsoids
       compute the ellipsoids and send nothing
 
-Exit codes: 0 done, 2 usage or input error.)";
+SIGHUP reads all models again; SIGTERM ends with the round, SIGINT at once.
+Exit codes: 0 done, 2 usage or input error, 5 the rate could not be kept: below 90 % for three
+seconds in a row.)";
 
 const std::vector<std::string> kCriteria{"volume", "robust"};
 const std::vector<std::string> kOrders{"importance", "spread"};
 const std::vector<std::string> kLogLevels{"trace", "debug", "info", "warn", "error", "off"};
+constexpr std::size_t kMaxPages = 1000;  // a table of contents of 200 s at five lines a second
 constexpr const char* kIdentityGroup = "Identity of the stream (random unless given; for tests)";
 
 // Texts as they come from the command line, before they mean anything.
 struct Texts {
     std::string to;
+    std::string loopback;
     std::string criterion = "robust";
     std::string tags = "8";
     std::string colour = "on";
+    std::string edges = "on";
     std::string order = "importance";
     std::string design_loss = "0.3";
     std::string refine = "20";
@@ -53,7 +67,11 @@ struct Texts {
     std::string cache;
     std::string decompose_only;
     std::string report;
+    std::string status;
+    std::string sdp;
     std::string session;
+    std::string sign;
+    std::string psk;
 };
 
 std::uint64_t rate_of(const std::string& text) {
@@ -130,22 +148,9 @@ double design_loss_of(const std::string& text) {
 }
 
 protocol::SessionId session_of(const std::string& text) {
-    protocol::SessionId session{};
-    const auto digit = [](char c) {
-        if (c >= '0' && c <= '9') return c - '0';
-        if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-        if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-        return -1;
-    };
-    bool ok = text.size() == 2 * session.size();
-    for (std::size_t k = 0; ok && k < session.size(); ++k) {
-        const int high = digit(text[2 * k]);
-        const int low = digit(text[2 * k + 1]);
-        ok = high >= 0 && low >= 0;
-        session[k] = static_cast<std::uint8_t>(16 * high + low);
-    }
-    if (!ok) throw common::refusal(text, "is not a session id of 16 hex digits");
-    return session;
+    const auto session = common::bytes_of_hex<sizeof(protocol::SessionId)>(text);
+    if (!session) throw common::refusal(text, "is not a session id of 16 hex digits");
+    return *session;
 }
 
 /// Refuses what `parse` refuses, with its words.
@@ -213,6 +218,11 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
         ->type_name("on|off")
         ->check(CLI::IsMember(std::vector<std::string>{"on", "off"}).description(""))
         ->capture_default_str();
+    app.add_option("--edges", texts.edges,
+                   "Name the few edges that a receiver would get wrong and that matter most")
+        ->type_name("on|off")
+        ->check(CLI::IsMember(std::vector<std::string>{"on", "off"}).description(""))
+        ->capture_default_str();
     app.add_option("--order", texts.order,
                    "Of the vertices: importance (any prefix is a good model), or spread evenly")
         ->type_name("RULE")
@@ -238,11 +248,13 @@ void add_geometry_options(CLI::App& app, Options& options, Texts& texts) {
 
 void add_stream_options(CLI::App& app, Options& options, Texts& texts) {
     app.add_option("--to", texts.to,
-                   "Where to send; IPv6 addresses in brackets, port 5004 by default")
+                   "Where to send, a host or a multicast group; IPv6 addresses in brackets, port "
+                   "5004 by default")
         ->type_name("HOST[:PORT]")
         ->check(accepted_by(destination_of));
     app.add_option("--rate", texts.rate,
-                   "Bits per second, IP and UDP headers included; k, M, G; 0: unpaced")
+                   "Bits per second, IP and UDP headers included; k, M, G; 0: unpaced. What the "
+                   "link or this host cannot keep is refused")
         ->type_name("RATE")
         ->check(accepted_by(rate_of))
         ->capture_default_str();
@@ -262,8 +274,46 @@ void add_stream_options(CLI::App& app, Options& options, Texts& texts) {
                             protocol::kMaxDatagramBytes, "UDP payload in bytes, at most");
 }
 
+/// A whole number that stays empty unless given.
+void add_small_number(CLI::App& app, const std::string& name, std::optional<int>& value, int low,
+                      int high, const std::string& help) {
+    const auto set = [name, low, high, &value](const std::string& text) {
+        value = common::number<int>(text);
+        if (value && *value >= low && *value <= high) return;
+        throw CLI::ValidationError(name, "'" + text + "' is not a whole number from " +
+                                             std::to_string(low) + " to " + std::to_string(high));
+    };
+    app.add_option_function<std::string>(name, set, help)->type_name("N");
+}
+
+void add_socket_options(CLI::App& app, Options& options, Texts& texts) {
+    app.add_option("--interface", options.interface,
+                   "Send by this interface, where routes would say another or none")
+        ->type_name("NAME");
+    add_small_number(app, "--ttl", options.ttl, 0, 255,
+                     "Hops that datagrams may take; 1 by default for multicast groups");
+    add_small_number(app, "--dscp", options.dscp, 0, 63,
+                     "Differentiated services code point, such as 8 for bulk, 34 for video");
+    app.add_option("--loopback", texts.loopback,
+                   "Whether listeners on this host hear the multicast group too")
+        ->type_name("on|off")
+        ->check(CLI::IsMember(std::vector<std::string>{"on", "off"}).description(""));
+    app.add_flag("--broadcast", options.broadcast, "The destination may be a broadcast address");
+}
+
 void add_program_options(CLI::App& app, Options& options, Texts& texts) {
     app.add_option("--report", texts.report, "JSON of what was made and sent")->type_name("FILE");
+    app.add_option("--status", texts.status,
+                   "JSON of what is on air, replaced as a whole every second")
+        ->type_name("FILE");
+    app.add_option("--sdp", texts.sdp,
+                   "Describe the stream for receivers (SDP, RFC 8866), just before it begins")
+        ->type_name("FILE");
+    app.add_option("--stop-timeout", options.stop_timeout_s,
+                   "What SIGTERM leaves the round to end; a second one, or Ctrl-C, ends at once")
+        ->type_name("SECONDS")
+        ->check(CLI::Range(0.0, 86400.0).description(""))
+        ->capture_default_str();
     app.add_option("--log-level", options.log_level, "trace, debug, info, warn, error or off")
         ->type_name("LEVEL")
         ->check(CLI::IsMember(kLogLevels).description(""))
@@ -273,6 +323,14 @@ void add_program_options(CLI::App& app, Options& options, Texts& texts) {
         ->type_name("FILE");
     app.set_version_flag("--version", "ellicast-send " ELLICAST_VERSION);
     common::add_loss_options(app, options.impairment);
+}
+
+void add_security_options(CLI::App& app, Texts& texts) {
+    app.add_option("--sign", texts.sign,
+                   "Private key to sign every datagram with; `ellicast-send key --help` makes one")
+        ->type_name("FILE");
+    app.add_option("--psk", texts.psk, "Shared key, 64 hex digits, to encrypt every datagram with")
+        ->type_name("FILE");
 }
 
 /// For an optional number that stays empty unless given.
@@ -315,13 +373,27 @@ void interpret(const Texts& texts, Options& options) {
         texts.criterion == "volume" ? Criterion::volume : Criterion::robust;
     options.tags = tags_of(texts.tags);
     options.tags.colour = texts.colour == "on";
+    options.tags.edges = texts.edges == "on";
     options.order = texts.order == "spread" ? SendingOrder::spread : SendingOrder::importance;
     options.decomposition.expected_loss = design_loss_of(texts.design_loss);
     options.decomposition.refine = refinement_of(texts.refine);
     if (!texts.certify.empty()) options.certify = goal_of(texts.certify);
+    if (!texts.loopback.empty()) options.loopback = texts.loopback == "on";
     options.cache = path_of(texts.cache);
     options.decompose_only = path_of(texts.decompose_only);
     options.report = path_of(texts.report);
+    options.sign = path_of(texts.sign);
+    options.psk = path_of(texts.psk);
+    if (options.protection().any() && !texts.session.empty()) {
+        throw CLI::ValidationError("--session",
+                                   "is drawn at random with --sign and --psk; a second stream with "
+                                   "it would give the key away");
+    }
+    options.status = path_of(texts.status);
+    options.sdp = path_of(texts.sdp);
+    if (options.sdp && options.decompose_only) {
+        throw CLI::ValidationError("--sdp", "there is no stream with --decompose-only");
+    }
     options.bits_per_second = rate_of(texts.rate);
     options.rounds = rounds_of(texts.rounds);
     options.redundancy = redundancy_of(texts.redundancy);
@@ -332,6 +404,9 @@ void interpret(const Texts& texts, Options& options) {
         options.port = destination.port.value_or(options.port);
     } else if (!options.decompose_only) {
         throw CLI::RequiredError("--to");
+    }
+    if (options.models.size() > kMaxPages) {
+        throw CLI::ValidationError("MODEL", "at most " + std::to_string(kMaxPages) + " models");
     }
     if (options.decompose_only && options.models.size() > 1) {
         throw CLI::ValidationError("--decompose-only", "takes one model");
@@ -351,6 +426,8 @@ std::variant<Options, int> parse_options(int argc, const char* const* argv) {
     });
     add_geometry_options(app, options, texts);
     add_stream_options(app, options, texts);
+    add_socket_options(app, options, texts);
+    add_security_options(app, texts);
     add_program_options(app, options, texts);
     add_identity_options(app, options, texts);
     try {

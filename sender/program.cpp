@@ -1,127 +1,62 @@
 // sender/program.cpp
 #include "sender/program.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "sender/certified_loading.hpp"
-#include "sender/model_loading.hpp"
+#include "common/atomic_file.hpp"
+#include "sender/model_watch.hpp"
+#include "sender/page_loading.hpp"
+#include "sender/page_names.hpp"
+#include "sender/rate_watch.hpp"
 #include "sender/report.hpp"
 #include "sender/session.hpp"
+#include "sender/stream_control.hpp"
+#include "sender/stream_description.hpp"
+#include "sender/stream_security.hpp"
 #include "sender/udp_endpoint.hpp"
 
 namespace ellicast::sender {
 namespace {
 
-void log_certificate(const LoadedModel& model) {
-    const Certificate& certificate = *model.certificate;
-    if (certificate.holds) {
-        spdlog::info("{}: {}, with {} copies of {} ellipsoids", model.path.string(),
-                     certificate_text(certificate), certificate.copies, certificate.ellipsoids);
-        return;
-    }
-    spdlog::warn(
-        "{}: no certificate: a topology right for {:g} at loss {:g} was not reached; the best was "
-        "{} of {} draws (at least {:.3f}) with {} copies of {} ellipsoids",
-        model.path.string(), certificate.goal.share, certificate.goal.loss, certificate.right,
-        certificate.draws, certificate.lower_bound, certificate.copies, certificate.ellipsoids);
+bool shows_progress(const Options& options) {
+    return !options.quiet && ::isatty(STDERR_FILENO) == 1;
 }
 
-void log_model(const LoadedModel& model) {
-    if (model.certificate) log_certificate(model);
-    for (const std::string& warning : model.warnings) {
-        spdlog::warn("{}: {}", model.path.string(), warning);
-    }
-    for (const StageTime& stage : model.stages) {
-        spdlog::debug("{}: {} took {:.3f} s, {:.3f} s CPU", model.path.string(), stage.stage,
-                      stage.wall_s, stage.cpu_s);
-    }
-}
-
-PlanOptions plan_options_of(const Options& options) {
-    PlanOptions plan;
-    plan.datagram_bytes = options.datagram_bytes;
-    plan.copies = options.copies;
-    plan.redundancy = options.redundancy;
-    plan.bits_per_second = options.bits_per_second;
-    plan.rounds = options.rounds;
-    return plan;
-}
-
-LoadedModel load_certified_model(const std::filesystem::path& path, const Options& options) {
-    CertificationOptions certification;
-    certification.trial.goal = *options.certify;
-    certification.trial.seed = options.decomposition.seed;
-    certification.trial.threads = options.decomposition.threads;
-    const bool progress = !options.quiet && ::isatty(STDERR_FILENO) == 1;
-    certification.trial.on_draws = [&](const LossTrial& trial) {
-        if (!progress) return;
-        std::fprintf(stderr, "\r%s: certifying, %zu of %zu draws right\033[K", path.c_str(),
-                     trial.right, trial.draws);
-    };
-    certification.plan = plan_options_of(options);
-    certification.ellipsoids = options.decomposition.ellipsoids;
-    certification.cache = options.cache;
-    const auto load = [&](std::size_t ellipsoids) {
-        DecompositionOptions decomposition = options.decomposition;
-        decomposition.ellipsoids = ellipsoids;
-        return load_model(path, decomposition, options.cache, options.tags, options.order);
-    };
-    LoadedModel model = load_certified(load, certification);
-    if (progress) std::fputs("\r\033[K", stderr);
-    return model;
-}
-
-LoadedModel decompose_only(const std::filesystem::path& path, const Options& options) {
-    DecompositionOptions decomposition = options.decomposition;
-    std::optional<Certificate> certificate;
-    if (options.certify) certificate = load_certified_model(path, options).certificate;
-    if (certificate) decomposition.ellipsoids = certificate->ellipsoids;
-    LoadedModel model =
-        decompose_to_file(path, decomposition, options.cache, *options.decompose_only);
-    model.certificate = certificate;
-    return model;
-}
-
-std::vector<LoadedModel> load_models(const Options& options) {
+/// The models in page order, their plans, and what their files were like just before.
+struct Pages {
+    std::vector<std::optional<FileStamp>> stamps;
     std::vector<LoadedModel> models;
-    for (const std::filesystem::path& path : options.models) {
-        if (options.decompose_only) {
-            models.push_back(decompose_only(path, options));
-        } else if (options.certify) {
-            models.push_back(load_certified_model(path, options));
-        } else {
-            models.push_back(load_model(path, options.decomposition, options.cache, options.tags,
-                                        options.order));
-        }
-        log_model(models.back());
-    }
-    return models;
-}
-
-/// Takes the objects out of the models.
-std::vector<RoundPlan> make_plans(std::vector<LoadedModel>& models, const Options& options,
-                                  const Identity& identity) {
-    PlanOptions plan_options = plan_options_of(options);
-    plan_options.session = identity.session;
     std::vector<RoundPlan> plans;
-    for (LoadedModel& model : models) {
-        plan_options.copies = model.certificate ? model.certificate->copies : options.copies;
-        const RoundPlan& plan = plans.emplace_back(std::move(model.object), plan_options);
-        spdlog::info("{}: {} vertices, {} ellipsoids x {}, {} datagrams a round",
-                     model.path.string(), plan.object().vertices.size(),
-                     plan.object().ellipsoids.size(), plan.copies(), plan.datagrams());
+};
+
+Pages load_pages(const Options& options, const std::vector<std::string>& names,
+                 const Identity& identity) {
+    Pages pages;
+    for (std::size_t page = 0; page < options.models.size(); ++page) {
+        pages.stamps.push_back(stamp_of(options.models[page]));
+        pages.models.push_back(load_page(page, names[page], options, shows_progress(options)));
     }
-    return plans;
+    for (LoadedModel& model : pages.models) {
+        pages.plans.push_back(
+            make_plan(model, options, identity.session, options.models.size() > 1));
+    }
+    return pages;
 }
 
 Session make_session(std::vector<RoundPlan> plans, const Options& options, const Identity& identity,
-                     std::size_t ip_udp_bytes) {
+                     StreamKeys keys, std::size_t ip_udp_bytes) {
     SessionOptions session_options;
     session_options.bits_per_second = options.bits_per_second;
     session_options.ip_udp_bytes = ip_udp_bytes;
@@ -129,7 +64,7 @@ Session make_session(std::vector<RoundPlan> plans, const Options& options, const
     session_options.first_sequence = identity.first_sequence;
     session_options.first_timestamp = identity.first_timestamp;
     session_options.impairment = options.impairment;
-    return {std::move(plans), session_options};
+    return {std::move(plans), session_options, begin_security(std::move(keys), identity.session)};
 }
 
 void show_progress(const Session& session, const std::string& peer) {
@@ -140,28 +75,120 @@ void show_progress(const Session& session, const std::string& peer) {
                  static_cast<unsigned long long>(counts.offered), of.c_str());
 }
 
-SendOutcome send(Session& session, UdpEndpoint& endpoint, const Options& options) {
+/// Watches the files of the pages unless each is sent just once.
+std::unique_ptr<ModelWatch> watch_pages(const Options& options, const Identity& identity,
+                                        const std::vector<std::string>& names, const Pages& pages) {
+    if (options.rounds == 1) return nullptr;
+    std::vector<protocol::ObjectId> objects;
+    objects.reserve(pages.plans.size());
+    for (const RoundPlan& plan : pages.plans) objects.push_back(plan.object().id);
+    const auto load = [options, session = identity.session, names](std::size_t page) {
+        LoadedModel model = load_page(page, names[page], options, false);
+        RoundPlan plan = make_plan(model, options, session, true);
+        return FreshPage{page, std::move(model), std::move(plan)};
+    };
+    return std::make_unique<ModelWatch>(options.models, pages.stamps, std::move(objects), load);
+}
+
+// From this rate on, 24 datagrams leave each millisecond, in batches: as one buffer they cost a
+// third. Below, what counts packets on this host should count datagrams.
+constexpr std::uint64_t kSegmentsFrom = 240'000'000;
+
+SocketOptions socket_options_of(const Options& options) {
+    SocketOptions socket;
+    socket.segments = options.bits_per_second == 0 || options.bits_per_second >= kSegmentsFrom;
+    socket.interface = options.interface;
+    socket.ttl = options.ttl;
+    socket.dscp = options.dscp;
+    socket.loopback = options.loopback;
+    socket.broadcast = options.broadcast;
+    return socket;
+}
+
+/// Throws SendError when the link is known to be slower than the stream is to be.
+void require_link(const Options& options, const UdpEndpoint& endpoint) {
+    const std::optional<Link> link = endpoint.link();
+    if (!link || options.bits_per_second <= link->bits_per_second) return;
+    throw SendError(fmt::format("--rate: {:g} Mbit/s are more than the {:g} Mbit/s of {}",
+                                static_cast<double>(options.bits_per_second) / 1e6,
+                                static_cast<double>(link->bits_per_second) / 1e6, link->interface));
+}
+
+void write_description(const Options& options, const Identity& identity,
+                       const std::vector<std::string>& names, const UdpEndpoint& endpoint,
+                       const SecuritySummary& security) {
+    if (!options.sdp) return;
+    const StreamWay way{endpoint.peer_address(), endpoint.local_address()};
+    const auto description = describe_stream(options, identity, names, way, security.public_key);
+    try {
+        common::write_file_atomically(*options.sdp,
+                                      protocol::session_description_text(description));
+    } catch (const common::WriteFailure& failure) {
+        throw SendError("--sdp " + options.sdp->string() + ": " + failure.what());
+    }
+    spdlog::info("the stream is described in {}", options.sdp->string());
+}
+
+SendOutcome send(Session& session, UdpEndpoint& endpoint, StreamControl& control,
+                 const Options& options) {
     SendOutcome outcome;
     outcome.peer = endpoint.peer();
     outcome.ip_udp_bytes = endpoint.ip_udp_bytes();
-    const bool progress = !options.quiet && ::isatty(STDERR_FILENO) == 1;
+    const bool progress = shows_progress(options);
     const Time start = UdpEndpoint::now();
-    outcome.interrupted = !endpoint.run(session, [&] {
+    RunHooks hooks;
+    hooks.stop_within = std::chrono::milliseconds(std::llround(1000.0 * options.stop_timeout_s));
+    if (options.rounds != 1) hooks.on_hangup = [&] { control.on_hangup(); };
+    RateWatch rate(options.bits_per_second, options.datagram_bytes + outcome.ip_udp_bytes);
+    hooks.on_tick = [&] {
+        const Time now = UdpEndpoint::now();
         if (progress) show_progress(session, outcome.peer);
-    });
+        control.on_tick(now);
+        return rate.look(now, session.counts().paid_bytes);
+    };
+    control.begin(start);
+    outcome.interrupted = !endpoint.run(session, hooks);
     if (progress) std::fputs("\r\033[K", stderr);
+    control.end(UdpEndpoint::now());
     outcome.seconds = std::chrono::duration<double>(UdpEndpoint::now() - start).count();
     outcome.session = session.counts();
+    outcome.versions = session.versions();
     outcome.endpoint = endpoint.counts();
+    outcome.rate_not_kept = rate.achieved();
     return outcome;
 }
 
-void log_outcome(const SendOutcome& outcome) {
+/// Whether a stream of some length was slower than asked for.
+bool fell_behind(const SendOutcome& outcome, const Options& options) {
+    constexpr double kLeastSeconds = 1.0;  // before, the machine's hiccups weigh as much
+    constexpr double kShare = 0.98;
+    return outcome.seconds >= kLeastSeconds && outcome.session.dropped == 0 &&
+           outcome.endpoint.refused == 0 && !outcome.rate_not_kept &&
+           achieved_rate(outcome) < kShare * static_cast<double>(options.bits_per_second);
+}
+
+/// Three digits that count, without a power of ten: "0.997", "20", "1000".
+std::string megabits(double bits_per_second) {
+    const double value = bits_per_second / 1e6;
+    return value < 100.0 ? fmt::format("{:.3g}", value) : fmt::format("{:.0f}", value);
+}
+
+void log_outcome(const SendOutcome& outcome, const Options& options) {
     const EndpointCounts& counts = outcome.endpoint;
-    spdlog::info("{} {} of {} datagrams to {}, {} bytes in {:.2f} s, {:.3g} Mbit/s",
+    const auto asked = static_cast<double>(options.bits_per_second);
+    spdlog::info("{} {} of {} datagrams to {}, {} bytes in {:.2f} s, {} Mbit/s",
                  outcome.interrupted ? "interrupted after" : "sent", counts.sent,
                  outcome.session.offered, outcome.peer, counts.bytes, outcome.seconds,
-                 achieved_rate(outcome) / 1e6);
+                 megabits(achieved_rate(outcome)));
+    if (fell_behind(outcome, options)) {
+        spdlog::warn("the socket did not keep {} Mbit/s: ask for less", megabits(asked));
+    }
+    if (outcome.rate_not_kept) {
+        spdlog::error(
+            "--rate: {:g} Mbit/s were asked for, and socket and host kept {} for {} s: "
+            "ask for less, or for 0, which is as fast as they can",
+            asked / 1e6, megabits(*outcome.rate_not_kept), RateWatch::kWindows);
+    }
     if (counts.refused > 0) {
         spdlog::warn("{} datagrams were refused: {}", counts.refused, counts.last_refusal);
     }
@@ -180,23 +207,46 @@ void write_report_of(const Options& options, const std::vector<LoadedModel>& mod
 
 void run_decomposition(const Options& options) {
     check_writable(*options.decompose_only);
-    write_report_of(options, load_models(options), {}, std::nullopt);
+    std::vector<LoadedModel> models;
+    models.push_back(decompose_page(0, options, shows_progress(options)));
+    write_report_of(options, models, {}, std::nullopt);
 }
 
 }  // namespace
 
-void run(const Options& options, const Identity& identity) {
+ExitCode run(const Options& options, const Identity& identity) {
     if (options.report) check_writable(*options.report);
-    if (options.decompose_only) return run_decomposition(options);
+    if (options.status) check_writable(*options.status);
+    if (options.sdp) check_writable(*options.sdp);
+    if (options.decompose_only) {
+        run_decomposition(options);
+        return ExitCode::done;
+    }
 
-    // Before the work on the models, so that a wrong address shows at once.
-    UdpEndpoint endpoint(options.host, options.port, options.datagram_bytes);
-    std::vector<LoadedModel> models = load_models(options);
-    Session session = make_session(make_plans(models, options, identity), options, identity,
+    // Before the work on the models, so that a wrong key or address shows at once.
+    StreamKeys keys = read_stream_keys(options);
+    UdpEndpoint endpoint(options.host, options.port, options.datagram_bytes,
+                         socket_options_of(options));
+    require_link(options, endpoint);
+    const std::vector<std::string> names = page_names(options.models);
+    Pages pages = load_pages(options, names, identity);
+    const std::unique_ptr<ModelWatch> watch = watch_pages(options, identity, names, pages);
+    const SecuritySummary security = summarise(keys, options, endpoint.ip_udp_bytes());
+    write_description(options, identity, names, endpoint, security);
+    Session session = make_session(std::move(pages.plans), options, identity, std::move(keys),
                                    endpoint.ip_udp_bytes());
-    const SendOutcome outcome = send(session, endpoint, options);
-    log_outcome(outcome);
-    write_report_of(options, models, session.plans(), outcome);
+    StreamControl control(options, session, endpoint, std::move(pages.models), watch.get());
+    SendOutcome outcome = send(session, endpoint, control, options);
+    outcome.security = security;
+    log_outcome(outcome, options);
+    write_report_of(options, control.models(), session.plans(), outcome);
+    const ExitCode code = outcome.rate_not_kept ? ExitCode::rate_not_kept : ExitCode::done;
+    if (watch && watch->busy()) {  // nobody waits for a model that will not be sent any more
+        spdlog::shutdown();
+        std::fflush(nullptr);
+        std::_Exit(static_cast<int>(code));
+    }
+    return code;
 }
 
 }  // namespace ellicast::sender

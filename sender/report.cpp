@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "common/atomic_file.hpp"
+#include "common/hex_text.hpp"
 #include "common/model_io.hpp"
 
 namespace ellicast::sender {
@@ -12,23 +13,22 @@ namespace {
 
 using nlohmann::ordered_json;
 
-std::string hex(const protocol::ObjectId& id) {
-    constexpr const char* kDigits = "0123456789abcdef";
-    std::string text;
-    for (const std::uint8_t byte : id) {
-        text += kDigits[byte >> 4];
-        text += kDigits[byte & 15];
-    }
-    return text;
+}  // namespace
+
+std::string id_text(const protocol::ObjectId& id) {
+    return common::hex_text(id);
 }
+
+namespace {
 
 ordered_json object_json(const LoadedModel& model, const RoundPlan& plan) {
     const BroadcastObject& object = plan.object();
     ordered_json json;
     json["name"] = object.description.name;
-    json["object_id"] = hex(object.id);
+    json["object_id"] = id_text(object.id);
     json["vertices"] = object.vertices.size();
     json["ellipsoids"] = object.ellipsoids.size();
+    json["edges"] = object.edges.size();
     json["record_format"] = {{"normal_bits", object.hint.format.normal_bits},
                              {"ring", object.hint.format.ring},
                              {"colour", object.hint.format.colour}};
@@ -78,19 +78,31 @@ ordered_json sending_json(const Options& options, const SendOutcome& outcome) {
     json["rounds"] = session.rounds;
     json["interrupted"] = outcome.interrupted;
     json["seconds"] = outcome.seconds;
+    const SecuritySummary& security = outcome.security;
+    json["security"] = {{"sealed", security.protection.sealed},
+                        {"signed", security.protection.is_signed},
+                        {"public_key", nullptr},
+                        {"signing_rate", nullptr}};
+    if (!security.public_key.empty()) json["security"]["public_key"] = security.public_key;
+    if (security.signing_rate) json["security"]["signing_rate"] = *security.signing_rate;
     json["rate"] = {{"asked", options.bits_per_second}, {"achieved", achieved_rate(outcome)}};
-    json["datagrams"] = {{"offered", session.offered},
-                         {"sent", endpoint.sent},
-                         {"dropped_by_simulation", session.dropped},
-                         {"duplicated_by_simulation", session.duplicated},
-                         {"refused", endpoint.refused},
-                         {"unreachable", endpoint.unreachable},
-                         {"socket_full", endpoint.socket_full},
-                         {"bytes", endpoint.bytes}};
+    json["datagrams"] = datagrams_json(session, endpoint);
     return json;
 }
 
 }  // namespace
+
+nlohmann::ordered_json datagrams_json(const SessionCounts& session,
+                                      const EndpointCounts& endpoint) {
+    return {{"offered", session.offered},
+            {"sent", endpoint.sent},
+            {"dropped_by_simulation", session.dropped},
+            {"duplicated_by_simulation", session.duplicated},
+            {"refused", endpoint.refused},
+            {"unreachable", endpoint.unreachable},
+            {"socket_full", endpoint.socket_full},
+            {"bytes", endpoint.bytes}};
+}
 
 double achieved_rate(const SendOutcome& outcome) {
     const EndpointCounts& endpoint = outcome.endpoint;
@@ -111,6 +123,9 @@ std::string report_json(const Options& options, const std::vector<LoadedModel>& 
     json["models"] = ordered_json::array();
     for (std::size_t k = 0; k < models.size(); ++k) {
         json["models"].push_back(model_json(models[k], k < plans.size() ? &plans[k] : nullptr));
+        if (outcome && k < outcome->versions.size()) {
+            json["models"].back()["version"] = outcome->versions[k];
+        }
     }
     if (outcome) json["sending"] = sending_json(options, *outcome);
     // File names need not be UTF-8, JSON must.

@@ -52,7 +52,7 @@ struct SectionLimits {
 };
 SectionLimits section_limits(const LayoutSizes& sizes) {
     SectionLimits limits;
-    limits.full = ellipsoids_that_fit(sizes.payload - sizes.description);
+    limits.full = ellipsoids_that_fit(sizes.payload - sizes.description - sizes.edges);
     limits.usual = std::clamp(ellipsoids_that_fit(sizes.payload / 2), 1u, limits.full);
     limits.least = std::min(kRidingEllipsoids, limits.usual);
     return limits;
@@ -124,6 +124,7 @@ std::uint32_t vertex_room(const LayoutSizes& sizes, const RoundLayout& layout,
     std::size_t taken = sizes.vertex_sections * (kSectionHeaderBytes + 1) - 1;
     if (sizes.format.tag_bits() % 8 == 0) taken = sizes.vertex_sections * kSectionHeaderBytes;
     if (ordinal % sizes.description_interval == 0) taken += sizes.description;
+    if (layout.edges_at(ordinal)) taken += sizes.edges;
     if (auto run = layout.ellipsoids_at(ordinal, 0)) {
         // Another rotation may put a class with one more record here.
         run->count = ceil_div(layout.ellipsoids, run->stride);
@@ -169,7 +170,9 @@ RoundLayout lay_out_positions(const LayoutSizes& sizes, std::uint32_t positions)
     layout.ellipsoids = sizes.ellipsoids;
     layout.head = head_length(sizes);
     const std::uint64_t fewest = ceil_div(sizes.ellipsoids, section_limits(sizes).full);
-    layout.body = static_cast<std::uint32_t>((sizes.copies - 1) * fewest);
+    layout.edge_sections = sizes.edge_sections;
+    layout.body =
+        std::max(static_cast<std::uint32_t>((sizes.copies - 1) * fewest), sizes.edge_sections);
     for (;;) {
         std::optional<std::vector<std::uint32_t>> groups =
             groups_for(sizes, layout.head, layout.body);
@@ -192,6 +195,7 @@ std::uint64_t round_bytes(const LayoutSizes& sizes, const RoundLayout& layout) {
     for (std::uint32_t k = 0; k < layout.datagrams(); ++k) {
         bytes += protocol::kHeaderBytes + protocol::kTrailerBytes;
         if (k % sizes.description_interval == 0) bytes += sizes.description;
+        if (layout.edges_at(k)) bytes += sizes.edges;
         if (const auto run = layout.ellipsoids_at(k, 0)) bytes += ellipsoid_section(*run);
         const std::uint64_t vertices = layout.first_vertex[k + 1] - layout.first_vertex[k];
         if (vertices > 0) bytes += kSectionHeaderBytes + sizes.format.vertex_bytes(vertices);
@@ -225,6 +229,14 @@ RoundLayout lay_out_bytes(const LayoutSizes& sizes, RoundLayout layout, double t
 
 }  // namespace
 
+std::optional<std::uint32_t> RoundLayout::edges_at(std::uint32_t ordinal) const {
+    if (ordinal < head) return std::nullopt;
+    const std::uint64_t d = ordinal - head;
+    const std::uint64_t before = d * edge_sections / body;
+    if (before == (d + 1) * edge_sections / body) return std::nullopt;
+    return static_cast<std::uint32_t>(before);
+}
+
 std::optional<EllipsoidRun> RoundLayout::ellipsoids_at(std::uint32_t ordinal,
                                                        std::uint32_t rotation) const {
     if (ordinal < head) {
@@ -249,7 +261,8 @@ std::optional<EllipsoidRun> RoundLayout::ellipsoids_at(std::uint32_t ordinal,
 RoundLayout lay_out(const LayoutSizes& sizes) {
     assert(sizes.ellipsoids >= 1 && sizes.vertices >= 1 && sizes.copies >= 1);
     assert(sizes.vertex_sections >= 1 && sizes.description_interval >= 1);
-    assert(sizes.payload >= sizes.description + 2 * kSectionHeaderBytes + kEllipsoidBytes);
+    assert(sizes.payload >=
+           sizes.description + sizes.edges + 2 * kSectionHeaderBytes + kEllipsoidBytes);
     assert(sizes.redundancy >= 1.0);
     LayoutSizes plain = sizes;
     plain.redundancy = 1.0;

@@ -20,6 +20,8 @@ struct LayoutSizes {
     protocol::RecordFormat format;    // of the vertices
     std::size_t copies = 1;           // of every ellipsoid, at least; 1: exactly once
     std::size_t vertex_sections = 1;  // of one datagram: headers to leave room for
+    std::size_t edges = 0;            // of the largest section of edges, header and all; 0: none
+    std::uint32_t edge_sections = 0;  // in a round
     double redundancy = 1.0;          // bytes of a round, in rounds that hold each vertex once
 };
 
@@ -38,6 +40,7 @@ struct RoundLayout {
     std::uint32_t ellipsoids = 0;
     std::uint32_t head = 0;
     std::uint32_t body = 0;
+    std::uint32_t edge_sections = 0;
     std::vector<std::uint32_t>
         groups;  // of each further copy: its section j is the class j mod groups
     std::vector<std::uint32_t> first_group;  // running sums of groups; groups.size() + 1 values
@@ -46,6 +49,10 @@ struct RoundLayout {
 
     [[nodiscard]] std::uint32_t datagrams() const { return head + body; }
     [[nodiscard]] std::uint32_t sections() const { return first_group.back(); }
+
+    /// Which of the sections of edges is in datagram `ordinal`: they stand at even distances in the
+    /// body.
+    [[nodiscard]] std::optional<std::uint32_t> edges_at(std::uint32_t ordinal) const;
 
     /// The ellipsoids in datagram `ordinal` of a round whose sections are rotated by `rotation`
     /// places.

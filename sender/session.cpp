@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iterator>
+#include <memory>
 #include <utility>
 
 #include "protocol/section_filter.hpp"
@@ -32,9 +34,13 @@ std::uint32_t rtp_ticks(Time elapsed) {
 
 }  // namespace
 
-Session::Session(std::vector<RoundPlan> plans, const SessionOptions& options)
+Session::Session(std::vector<RoundPlan> plans, const SessionOptions& options,
+                 std::optional<DatagramSecurity> security)
     : plans_(std::move(plans)),
+      versions_(plans_.size(), 1),
+      first_rounds_(plans_.size(), 0),
       options_(options),
+      security_(std::move(security)),
       impairment_(options.impairment),
       lost_ellipsoids_(section_loss(options.impairment.drop_ellipsoids, options.impairment.seed,
                                     LossStream::ellipsoids)),
@@ -45,7 +51,70 @@ Session::Session(std::vector<RoundPlan> plans, const SessionOptions& options)
     assert(std::all_of(plans_.begin(), plans_.end(), [&](const RoundPlan& plan) {
         return plan.rounds() == plans_.front().rounds();
     }));
+    if (plans_.size() > 1) tell_contents();
+    if (security_) security_bytes_ = protocol::security_bytes(security_->protection());
     if (options.bits_per_second > 0) bucket_.emplace(options.bits_per_second, kBurst);
+}
+
+void Session::replace(std::size_t page, RoundPlan plan) {
+    assert(page < plans_.size() && plan.rounds() == plans_.front().rounds());
+    waiting_.insert_or_assign(page, std::move(plan));
+    if (page == plan_ && ordinal_ == 0) begin_turn();
+}
+
+/// The page's new object, where one waits, takes its place.
+void Session::begin_turn() {
+    const auto next = waiting_.find(plan_);
+    if (next == waiting_.end()) return;
+    retired_.push_back(std::exchange(plans_[plan_], std::move(next->second)));
+    waiting_.erase(next);
+    ++versions_[plan_];
+    first_rounds_[plan_] = round_;
+    tell_contents();
+}
+
+/// The table of contents, to all plans.
+void Session::tell_contents() {
+    auto contents = std::make_shared<Contents>();
+    for (std::size_t page = 0; page < plans_.size(); ++page) {
+        const BroadcastObject& object = plans_[page].object();
+        contents->push_back({.page = static_cast<std::uint16_t>(page),
+                             .pages = static_cast<std::uint16_t>(plans_.size()),
+                             .version = versions_[page],
+                             .object = object.id,
+                             .components = object.hint.components,
+                             .euler_all = object.hint.euler_all,
+                             .ellipsoids = object.hint.ellipsoids,
+                             .vertices = object.hint.vertices,
+                             .name = object.description.name});
+    }
+    for (std::size_t page = 0; page < plans_.size(); ++page) {
+        plans_[page].set_place({first_rounds_[page], static_cast<std::uint16_t>(page),
+                                plans_[page].paged() ? contents : nullptr});
+    }
+}
+
+std::vector<RoundPlan> Session::take_retired() {
+    return std::exchange(retired_, {});
+}
+
+bool Session::cut_short() const {
+    return finishing_ && (plans_.front().rounds() == 0 || round_ < plans_.front().rounds());
+}
+
+void Session::recycle(std::vector<Datagram>& spent) {
+    const std::size_t room = kBatch - std::min(kBatch, spent_.size());
+    const auto kept = static_cast<std::ptrdiff_t>(std::min(room, spent.size()));
+    spent_.insert(spent_.end(), std::move_iterator(spent.begin()),
+                  std::move_iterator(spent.begin() + kept));
+    spent.clear();
+}
+
+Datagram Session::take_spent() {
+    if (spent_.empty()) return {};
+    Datagram memory = std::move(spent_.back());
+    spent_.pop_back();
+    return memory;
 }
 
 void Session::poll(Time now, std::vector<Datagram>& out) {
@@ -55,16 +124,17 @@ void Session::poll(Time now, std::vector<Datagram>& out) {
     const std::uint32_t timestamp = options_.first_timestamp + rtp_ticks(now - *start_);
     for (std::size_t k = 0; k < kBatch && !done_; ++k) {
         if (bucket_ && bucket_->ready_at() > now) break;
-        Datagram datagram =
-            plans_[plan_].datagram(round_, ordinal_, {sequence_, timestamp, options_.ssrc});
+        Datagram datagram = plans_[plan_].datagram(
+            round_, ordinal_, {sequence_, timestamp, options_.ssrc}, take_spent());
+        const std::size_t price = datagram.size() + security_bytes_ + options_.ip_udp_bytes;
         if (bucket_) {
-            [[maybe_unused]] const bool paid =
-                bucket_->take(now, datagram.size() + options_.ip_udp_bytes);
+            [[maybe_unused]] const bool paid = bucket_->take(now, price);
             assert(paid);
         }
+        counts_.paid_bytes += price;
         ++sequence_;
         ++counts_.offered;
-        offer(std::move(datagram), out);
+        offer(now, std::move(datagram), out);
         advance();
     }
     if (done_) impairment_.flush(out);
@@ -83,7 +153,7 @@ std::optional<std::uint64_t> Session::datagrams_in_all() const {
     return in_a_round * plans_.front().rounds();
 }
 
-void Session::offer(Datagram datagram, std::vector<Datagram>& out) {
+void Session::offer(Time now, Datagram datagram, std::vector<Datagram>& out) {
     const common::ImpairmentOptions& loss = options_.impairment;
     if (loss.drop_ellipsoids > 0 || loss.drop_vertices > 0) {
         const auto keep = [&](const protocol::SectionView& section) {
@@ -102,6 +172,10 @@ void Session::offer(Datagram datagram, std::vector<Datagram>& out) {
         }
         datagram = *std::move(rest);
     }
+    if (security_) {
+        const auto elapsed = std::chrono::duration_cast<std::chrono::microseconds>(now - *start_);
+        datagram = security_->secure(datagram, static_cast<std::uint64_t>(elapsed.count()));
+    }
     if (loss.any()) {
         impairment_.offer(std::move(datagram), out);
     } else {
@@ -112,11 +186,13 @@ void Session::offer(Datagram datagram, std::vector<Datagram>& out) {
 void Session::advance() {
     if (++ordinal_ < plans_[plan_].datagrams()) return;
     ordinal_ = 0;
-    if (++plan_ < plans_.size()) return;
-    plan_ = 0;
-    ++counts_.rounds;
-    ++round_;
-    done_ = plans_.front().rounds() != 0 && round_ == plans_.front().rounds();
+    if (++plan_ == plans_.size()) {
+        plan_ = 0;
+        ++counts_.rounds;
+        ++round_;
+        done_ = finishing_ || (plans_.front().rounds() != 0 && round_ == plans_.front().rounds());
+    }
+    if (!done_) begin_turn();
 }
 
 }  // namespace ellicast::sender

@@ -1,57 +1,16 @@
 // sender/spread_order.cpp
 #include "sender/spread_order.hpp"
 
-#include <algorithm>
 #include <bit>
+#include <cstddef>
 
+#include "common/morton_order.hpp"
 #include "common/random.hpp"
-#include "common/triangle_mesh.hpp"
 
 namespace ellicast::sender {
-namespace {
-
-/// Spreads the lower 21 bits of x to every third bit.
-std::uint64_t every_third_bit(std::uint64_t x) {
-    x = (x | x << 32) & 0x001f00000000ffffu;
-    x = (x | x << 16) & 0x001f0000ff0000ffu;
-    x = (x | x << 8) & 0x100f00f00f00f00fu;
-    x = (x | x << 4) & 0x10c30c30c30c30c3u;
-    x = (x | x << 2) & 0x1249249249249249u;
-    return x;
-}
-
-}  // namespace
-
-std::vector<std::uint32_t> morton_order(const std::vector<Eigen::Vector3d>& positions) {
-    const Eigen::AlignedBox3d box = common::bounding_box(positions);
-    const double longest = box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
-    const double scale = longest > 0.0 ? ((1 << 21) - 1) / longest : 0.0;
-    struct Key {
-        std::uint64_t code;
-        std::uint32_t index;
-    };
-    std::vector<Key> keys;
-    keys.reserve(positions.size());
-    for (const Eigen::Vector3d& p : positions) {
-        std::uint64_t code = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const auto cell = static_cast<std::uint64_t>((p[axis] - box.min()[axis]) * scale);
-            code |= every_third_bit(cell) << axis;
-        }
-        keys.push_back({code, static_cast<std::uint32_t>(keys.size())});
-    }
-    std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
-        return a.code != b.code ? a.code < b.code : a.index < b.index;
-    });
-    std::vector<std::uint32_t> order;
-    order.reserve(keys.size());
-    for (const Key& key : keys) order.push_back(key.index);
-    return order;
-}
-
 std::vector<std::uint32_t> spread_order(const std::vector<Eigen::Vector3d>& positions,
                                         std::uint64_t seed) {
-    const std::vector<std::uint32_t> along_curve = morton_order(positions);
+    const std::vector<std::uint32_t> along_curve = common::morton_order(positions);
     const std::size_t count = along_curve.size();
 
     // A binary tree over the ranks: every node halves its range. Which half is visited first is a

@@ -7,10 +7,6 @@
 
 namespace ellicast::sender {
 
-/// Indices along a Morton curve through the bounding cube, 2^21 cells an axis; ties by index.
-/// Requires finite positions. Cost: n log n.
-std::vector<std::uint32_t> morton_order(const std::vector<Eigen::Vector3d>& positions);
-
 /// Seeded stratified order: the k-th prefix of any length is an even sample of the surface. Ranks
 /// along a Morton curve are visited in bit-reversed order, shuffled inside strata by the seed. Any
 /// 2^d visits that follow each other at an odd stride and begin at a multiple of 2^d strides lie in

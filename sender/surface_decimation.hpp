@@ -16,9 +16,16 @@ namespace ellicast::sender {
 /// allowed, and at last anything. Positions that no triangle uses any more are the last, those that
 /// stand for more area behind those for less, among equals backwards through a spread order. Works
 /// on any triangles, whatever their quality. Ties go by place and index: same surface, same order.
-/// Requires finite positions, indices in range. Cost: n log n, 4 us a position; memory: 250 bytes a
-/// position.
-std::vector<std::uint32_t> removal_order(const common::TriangleMesh& surface);
+///
+/// More than 2^17 positions are decimated in ranges along a Morton curve: of 2^14 positions each,
+/// with their borders left alone, down to a quarter; then of four times as many, and so on; at last
+/// the whole. The order is that of the costs, each at least that of what its range removed before.
+/// A prefix is 1 to 3 % farther from the surface than without ranges, of a hundredth 7 %. Threads
+/// do not change the result.
+///
+/// Requires finite positions, indices in range. Cost: n log n, 5 us a position, linear with ranges;
+/// memory: 180 bytes a position.
+std::vector<std::uint32_t> removal_order(const common::TriangleMesh& surface, unsigned threads = 0);
 
 /// The same decimation, of those vertices only that are not to be kept, as far as it leaves the
 /// topology alone: the original on just so many vertices, for comparisons. `keep` has one value a

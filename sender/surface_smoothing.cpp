@@ -21,16 +21,6 @@ std::vector<double> neighbour_counts(const TriangleMesh& mesh) {
     return counts;
 }
 
-double mean_edge_length(const TriangleMesh& mesh) {
-    double sum = 0.0;
-    for (const Triangle& t : mesh.triangles) {
-        for (std::size_t i = 0; i < 3; ++i) {
-            sum += (mesh.positions[t[i]] - mesh.positions[t[(i + 1) % 3]]).norm();
-        }
-    }
-    return mesh.triangles.empty() ? 0.0 : sum / static_cast<double>(3 * mesh.triangles.size());
-}
-
 }  // namespace
 
 std::vector<Vector3d> smoothed_positions(const TriangleMesh& mesh, int steps) {
@@ -57,7 +47,7 @@ int default_smoothing_steps(const TriangleMesh& mesh) {
     // to 48 thousand vertices have mean edges near 0.005 and profit from 3 steps; at 10 thousand
     // (0.01) one is best, and below, where edges are the size of the features, any step costs
     // coverage.
-    const double edge = mean_edge_length(mesh);
+    const double edge = common::mean_edge_length(mesh);
     if (edge < 0.003) return 3;
     if (edge < 0.012) return 1;
     return 0;

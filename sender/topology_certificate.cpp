@@ -48,6 +48,7 @@ std::vector<Cargo> cargo_of(const RoundPlan& plan) {
         assert(view);
         for (const protocol::SectionView& section : view->sections()) {
             if (section.kind == SectionKind::description) continue;
+            if (section.kind == SectionKind::page || section.kind == SectionKind::edges) continue;
             std::vector<std::uint32_t>& into = section.kind == SectionKind::ellipsoids
                                                    ? cargo[ordinal].ellipsoids
                                                    : cargo[ordinal].vertices;

@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <span>
 #include <stdexcept>
-#include <tuple>
 #include <vector>
 
 #include "sender/edge_table.hpp"
+#include "sender/equal_positions.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -32,30 +32,21 @@ std::vector<bool> used_vertices(const std::vector<Triangle>& triangles, std::siz
 // For every used vertex the first used one at the same position.
 std::vector<std::uint32_t> first_at_position(const TriangleMesh& mesh,
                                              const std::vector<bool>& used) {
-    struct Place {
-        double x, y, z;
-        std::uint32_t vertex;
-    };
-    std::vector<Place> places;
-    for (std::size_t v = 0; v < used.size(); ++v) {
+    std::vector<std::uint32_t> vertices;
+    for (std::uint32_t v = 0; v < used.size(); ++v) {
         if (!used[v]) continue;
-        const Vector3d& p = mesh.positions[v];
         // Cubes of lengths must stay finite too.
-        if (!(p.cwiseAbs().array() < 1e100).all()) {
+        if (!(mesh.positions[v].cwiseAbs().array() < 1e100).all()) {
             throw std::invalid_argument("a coordinate is not finite or beyond all measure");
         }
-        places.push_back({p.x(), p.y(), p.z(), static_cast<std::uint32_t>(v)});
+        vertices.push_back(v);
     }
-    std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-        return std::tie(a.x, a.y, a.z, a.vertex) < std::tie(b.x, b.y, b.z, b.vertex);
+    const std::vector<std::uint32_t> equal = first_equals(vertices.size(), [&](std::size_t k) {
+        const Vector3d& p = mesh.positions[vertices[k]];
+        return std::array<double, 3>{p.x(), p.y(), p.z()};
     });
     std::vector<std::uint32_t> first(used.size(), kNone);
-    for (std::size_t i = 0; i < places.size(); ++i) {
-        const Place& a = places[i];
-        const bool again =
-            i > 0 && places[i - 1].x == a.x && places[i - 1].y == a.y && places[i - 1].z == a.z;
-        first[a.vertex] = again ? first[places[i - 1].vertex] : a.vertex;
-    }
+    for (std::size_t k = 0; k < vertices.size(); ++k) first[vertices[k]] = vertices[equal[k]];
     return first;
 }
 

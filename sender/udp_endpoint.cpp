@@ -1,15 +1,19 @@
 // sender/udp_endpoint.cpp
 #include "sender/udp_endpoint.hpp"
 
+#include <net/if.h>
 #include <netinet/in.h>
-#include <netinet/ip.h>
+#include <spdlog/spdlog.h>
 #include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstring>
+#include <cstddef>
+#include <span>
 #include <system_error>
 #include <utility>  // before Asio, which forgets it in C++20
 
@@ -19,6 +23,9 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include "sender/batch_sending.hpp"
+#include "sender/socket_settings.hpp"
+
 namespace ellicast::sender {
 namespace {
 
@@ -26,8 +33,13 @@ namespace asio = boost::asio;
 using asio::ip::udp;
 using boost::system::error_code;
 
-// Room for the burst of a fast stream; the system may grant less.
-constexpr int kSendBufferBytes = 4 << 20;
+// Room for the burst of a fast stream; the system may grant less. The kernel counts twice as much,
+// and 2304 bytes for a datagram of 1200: some 900 datagrams, 9 ms at 1 Gbit/s, and less than the
+// 1000 places of an interface's default queue.
+constexpr int kSendBufferBytes = 1 << 20;
+
+// An interface that takes nothing for longer than this is not busy.
+constexpr Time kLongestQueue = std::chrono::seconds(1);
 
 // Shortest sleep. Finer than any pace that one sees, coarse enough that a gigabit stream leaves in
 // batches of twenty instead of one wake-up a datagram.
@@ -35,28 +47,76 @@ constexpr Time kLeastSleep = std::chrono::microseconds(200);
 
 constexpr Time kTick = std::chrono::milliseconds(200);
 
-void set_option(int socket, int level, int name, int value) {
-    // Refusals are no error: without the option the datagrams go all the same.
-    (void)::setsockopt(socket, level, name, &value, sizeof value);
-}
-
-void forbid_fragments(udp::socket& socket, bool v6) {
-    const int native = socket.native_handle();
-    set_option(native, IPPROTO_IP, IP_MTU_DISCOVER, IP_PMTUDISC_DO);
-    if (!v6) return;
-    set_option(native, IPPROTO_IPV6, IPV6_MTU_DISCOVER, IPV6_PMTUDISC_DO);
-    set_option(native, IPPROTO_IPV6, IPV6_DONTFRAG, 1);
-}
-
 std::string to_text(const udp::endpoint& endpoint) {
     const std::string address = endpoint.address().to_string();
     const std::string port = ":" + std::to_string(endpoint.port());
     return endpoint.address().is_v6() ? "[" + address + "]" + port : address + port;
 }
 
+/// Without the zone, which means something on this host alone.
+std::string address_text(const asio::ip::address& address) {
+    if (!address.is_v6()) return address.to_string();
+    asio::ip::address_v6 v6 = address.to_v6();
+    v6.scope_id(0);
+    return v6.to_string();
+}
+
+/// Addresses of one link mean something only together with an interface.
+udp::endpoint on_interface(udp::endpoint endpoint, unsigned interface) {
+    if (interface == 0 || !endpoint.address().is_v6()) return endpoint;
+    asio::ip::address_v6 address = endpoint.address().to_v6();
+    if (address.scope_id() != 0) return endpoint;
+    if (address.is_link_local() || address.is_multicast_link_local()) address.scope_id(interface);
+    return {address, endpoint.port()};
+}
+
+/// The interface that the user named, by option or with an address of one link; empty where none.
+std::string name_of_interface(const SocketOptions& options, const udp::endpoint& endpoint) {
+    if (!options.interface.empty() || !endpoint.address().is_v6()) return options.interface;
+    std::array<char, IF_NAMESIZE> name{};
+    const auto scope = static_cast<unsigned>(endpoint.address().to_v6().scope_id());
+    return ::if_indextoname(scope, name.data()) != nullptr ? name.data() : "";
+}
+
+/// The same address by the interface that has this number now.
+udp::endpoint renumbered(const udp::endpoint& endpoint, unsigned interface) {
+    if (!endpoint.address().is_v6()) return endpoint;
+    asio::ip::address_v6 address = endpoint.address().to_v6();
+    if (address.scope_id() != 0) address.scope_id(interface);
+    return {address, endpoint.port()};
+}
+
+/// What may be an ICMP answer to an earlier datagram, told in place of sending this one. Telling it
+/// clears it.
+bool may_be_answer(int error) {
+    return error == ECONNREFUSED || error == EHOSTUNREACH || error == ENETUNREACH ||
+           error == EACCES || error == EPROTO || error == EHOSTDOWN || error == ENONET ||
+           error == EOPNOTSUPP || error == ENOPROTOOPT;
+}
+
+std::string reason_of(const error_code& error) {
+    if (error == boost::system::errc::permission_denied) {
+        return error.message() + "; if it is a broadcast address, ask for --broadcast";
+    }
+    if (error == boost::system::errc::invalid_argument ||
+        error == boost::system::errc::network_unreachable) {
+        return error.message() + "; perhaps --interface helps";
+    }
+    return error.message();
+}
+
 }  // namespace
 
 struct UdpEndpoint::Impl {
+    explicit Impl(const SocketOptions& socket_options)
+        : options(socket_options), sending(options.segments) {}
+
+    SocketOptions options;
+    std::string interface;  // by name; empty: none in particular
+    unsigned interface_number = 0;
+    std::uint16_t local_port = 0;  // 0: any
+    bool complained = false;
+
     asio::io_context context{1};
     udp::socket socket{context};
     asio::steady_timer timer{context};
@@ -65,24 +125,35 @@ struct UdpEndpoint::Impl {
 
     // While running.
     Session* session = nullptr;
-    const std::function<void()>* on_tick = nullptr;
+    const RunHooks* hooks = nullptr;
+    asio::steady_timer stop_timer{context};
+    asio::steady_timer tick_timer{context};
     asio::signal_set signals{context};
     std::vector<Datagram> batch;
+    BatchSending sending;
     std::size_t batch_sent = 0;  // how much of the batch is done with
-    int unreachable_in_a_row = 0;
-    Time next_tick{};
+    int answers_in_a_row = 0;
+    std::optional<Time> queue_full_since;  // nothing has been taken since then
+    bool stopping = false;                 // at the end of the round
     bool interrupted = false;
 
     void open(const std::string& host, std::uint16_t port);
+    [[nodiscard]] error_code connect();
+    void follow_interface();
     void check_size(std::size_t datagram_bytes) const;
     [[nodiscard]] bool v6() const { return peer.address().is_v6(); }
     [[nodiscard]] std::size_t ip_udp_bytes() const { return v6() ? 48 : 28; }
     [[nodiscard]] std::optional<std::size_t> mtu() const;
 
+    enum class Room { enough, socket_full, queue_full };
     void step();
     void sleep_until(Time when);
-    bool send_batch();
-    bool go_on_after(int error);
+    Room send_batch();
+    Room go_on_after(const BatchSending::Progress& progress);
+    void wait_for_tick();
+    void wait_for_signal();
+    void on_signal(int number);
+    void interrupt();
 };
 
 void UdpEndpoint::Impl::open(const std::string& host, std::uint16_t port) {
@@ -92,16 +163,57 @@ void UdpEndpoint::Impl::open(const std::string& host, std::uint16_t port) {
         resolver.resolve(host, std::to_string(port), udp::resolver::numeric_service, error);
     if (error) throw SendError("cannot resolve host '" + host + "': " + error.message());
     for (const auto& entry : found) {
-        peer = entry.endpoint();
-        socket.close(error);
-        socket.open(peer.protocol(), error);
-        if (!error) socket.connect(peer, error);
+        peer = on_interface(entry.endpoint(), interface_index(options));
+        error = connect();
         if (!error) break;
     }
-    if (error) throw SendError("cannot send to " + to_text(peer) + ": " + error.message());
+    if (error) throw SendError("cannot send to " + to_text(peer) + ": " + reason_of(error));
+    interface = name_of_interface(options, peer);
+    interface_number = ::if_nametoindex(interface.c_str());
+    local_port = socket.local_endpoint(error).port();
+}
+
+/// A new socket to the peer, from the same port as the last one.
+error_code UdpEndpoint::Impl::connect() {
+    error_code error;
+    socket.close(error);
+    socket.open(peer.protocol(), error);
+    if (error) return error;
+    const int native = socket.native_handle();
+    set_addressing(native, v6(), peer.address().is_multicast(), options);
+    forbid_fragments(native, v6());
+    hear_of_full_queues(native, v6());
+    if (local_port != 0) socket.bind({peer.protocol(), local_port}, error);
+    if (!error) socket.connect(peer, error);
+    if (error) return error;
     socket.native_non_blocking(true);
-    forbid_fragments(socket, v6());
-    set_option(socket.native_handle(), SOL_SOCKET, SO_SNDBUF, kSendBufferBytes);
+    // The system may grant less.
+    (void)::setsockopt(native, SOL_SOCKET, SO_SNDBUF, &kSendBufferBytes, sizeof kSendBufferBytes);
+    return {};
+}
+
+/// An interface that goes down and comes up is the same to the socket. One that was away,
+/// unplugged or with its driver, is another one to the kernel when it returns: a new socket sends
+/// there, from the same port, for receivers go by it.
+void UdpEndpoint::Impl::follow_interface() {
+    const unsigned number = interface.empty() ? 0 : ::if_nametoindex(interface.c_str());
+    if (number == 0 || number == interface_number) return;
+    if (!has_address(interface, v6())) return;  // the kernel would lend another one's for good
+    std::string complaint;
+    try {
+        peer = renumbered(peer, number);
+        const error_code error = connect();
+        if (error) complaint = reason_of(error);
+    } catch (const SendError& failure) {
+        complaint = failure.what();
+    }
+    if (complaint.empty()) {
+        interface_number = number;
+        spdlog::info("{} is back: sending there again", interface);
+    } else if (!complained) {
+        spdlog::warn("{} is back, but: {}", interface, complaint);  // tried again at every tick
+    }
+    complained = !complaint.empty();
 }
 
 std::optional<std::size_t> UdpEndpoint::Impl::mtu() const {
@@ -131,23 +243,24 @@ void UdpEndpoint::Impl::check_size(std::size_t datagram_bytes) const {
 void UdpEndpoint::Impl::step() {
     if (interrupted) return;
     if (batch_sent == batch.size()) {
-        batch.clear();
+        session->recycle(batch);
         batch_sent = 0;
         session->poll(now(), batch);
     }
-    const bool all_sent = send_batch();
+    const Room room = send_batch();
     const Time after = now();
-    if (after >= next_tick) {
-        next_tick = after + kTick;
-        if (*on_tick) (*on_tick)();
-    }
-    if (!all_sent) {
-        ++counts.socket_full;
+    if (room != Room::enough) ++counts.socket_full;
+    if (room == Room::queue_full) {
+        sleep_until(after + kLeastSleep);  // nobody tells when there is room again
+    } else if (room == Room::socket_full) {
+        forget_answers(socket.native_handle());
         socket.async_wait(udp::socket::wait_write, [this](const error_code& error) {
-            if (!error) step();
+            // Cut short by a new socket, which may have room.
+            if (!error || error == asio::error::operation_aborted) step();
         });
     } else if (session->done()) {
-        signals.cancel();
+        // Not by cancelling what else is waited for: a tick that is due would go on.
+        context.stop();
     } else if (session->next_wakeup() <= after) {
         asio::post(context, [this] { step(); });  // by way of the loop, so that signals are heard
     } else {
@@ -163,84 +276,136 @@ void UdpEndpoint::Impl::sleep_until(Time when) {
     });
 }
 
-/// False when the socket has no room for the rest.
-bool UdpEndpoint::Impl::send_batch() {
+/// Until all is sent or there is no room for the rest.
+UdpEndpoint::Impl::Room UdpEndpoint::Impl::send_batch() {
     while (batch_sent < batch.size()) {
-        std::array<::iovec, 2 * Session::kBatch> pieces{};
-        std::array<::mmsghdr, 2 * Session::kBatch> messages{};
-        const std::size_t count = std::min(pieces.size(), batch.size() - batch_sent);
-        for (std::size_t k = 0; k < count; ++k) {
-            Datagram& datagram = batch[batch_sent + k];
-            pieces[k] = {datagram.data(), datagram.size()};
-            messages[k].msg_hdr.msg_iov = &pieces[k];
-            messages[k].msg_hdr.msg_iovlen = 1;
+        const BatchSending::Progress progress =
+            sending.send(socket.native_handle(), std::span(batch).subspan(batch_sent));
+        if (progress.datagrams > 0) {
+            answers_in_a_row = 0;
+            queue_full_since.reset();
         }
-        const int taken = ::sendmmsg(socket.native_handle(), messages.data(),
-                                     static_cast<unsigned>(count), MSG_NOSIGNAL);
-        if (taken <= 0) {
-            if (!go_on_after(errno)) return false;
-            continue;
-        }
-        unreachable_in_a_row = 0;
-        for (std::size_t k = 0; k < static_cast<std::size_t>(taken); ++k) {
-            counts.bytes += batch[batch_sent + k].size();
-        }
-        counts.sent += static_cast<std::size_t>(taken);
-        batch_sent += static_cast<std::size_t>(taken);
+        counts.bytes += progress.bytes;
+        counts.sent += progress.datagrams;
+        batch_sent += progress.datagrams;
+        const Room room = progress.error == 0 ? Room::enough : go_on_after(progress);
+        if (room != Room::enough) return room;
     }
-    return true;
+    return Room::enough;
 }
 
-/// Deals with the error that the next datagram of the batch met. False: wait for room.
-bool UdpEndpoint::Impl::go_on_after(int error) {
-    if (error == EAGAIN || error == EWOULDBLOCK) return false;
-    if (error == EINTR) return true;
-    // An ICMP answer to an earlier datagram, told in place of sending this one; telling it clears
-    // it.
-    if (error == ECONNREFUSED && unreachable_in_a_row < 3) {
-        ++unreachable_in_a_row;
-        ++counts.unreachable;
-        return true;
+/// Deals with the error that the next datagrams of the batch met.
+UdpEndpoint::Impl::Room UdpEndpoint::Impl::go_on_after(const BatchSending::Progress& progress) {
+    const int error = progress.error;
+    if (error == EAGAIN || error == EWOULDBLOCK) return Room::socket_full;
+    if (error == ENOBUFS) {
+        if (!queue_full_since) queue_full_since = now();
+        if (now() - *queue_full_since < kLongestQueue) return Room::queue_full;
+        // No queue is full for so long; a filter drops them.
     }
-    unreachable_in_a_row = 0;
-    ++counts.refused;
+    if (error == EINTR) return Room::enough;
+    if (may_be_answer(error) && answers_in_a_row < 3) {
+        ++answers_in_a_row;
+        if (error == ECONNREFUSED) ++counts.unreachable;
+        return Room::enough;
+    }
+    answers_in_a_row = 0;
+    counts.refused += progress.refused;
     counts.last_refusal = std::generic_category().message(error);
-    ++batch_sent;
-    return true;
+    if (error == EMSGSIZE && mtu()) {
+        counts.last_refusal += "; by now the way carries " + std::to_string(*mtu()) +
+                               " bytes a packet: use --datagram " +
+                               std::to_string(*mtu() - ip_udp_bytes()) + " or less";
+    }
+    batch_sent += progress.refused;
+    return Room::enough;
 }
 
-UdpEndpoint::UdpEndpoint(const std::string& host, std::uint16_t port, std::size_t datagram_bytes)
-    : impl_(std::make_unique<Impl>()) {
+UdpEndpoint::UdpEndpoint(const std::string& host, std::uint16_t port, std::size_t datagram_bytes,
+                         const SocketOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {
     impl_->open(host, port);
     impl_->check_size(datagram_bytes);
 }
 
 UdpEndpoint::~UdpEndpoint() = default;
 
-bool UdpEndpoint::run(Session& session, const std::function<void()>& on_tick) {
+/// By a timer of its own: what waits for the socket or for a slow pace has ticks, too.
+void UdpEndpoint::Impl::wait_for_tick() {
+    tick_timer.expires_after(kTick);
+    tick_timer.async_wait([this](const error_code& error) {
+        if (error || interrupted) return;
+        follow_interface();
+        if (!hooks->on_tick || hooks->on_tick()) {
+            wait_for_tick();
+        } else {
+            interrupt();
+        }
+    });
+}
+
+void UdpEndpoint::Impl::wait_for_signal() {
+    signals.async_wait([this](const error_code& error, int number) {
+        if (!error) on_signal(number);
+    });
+}
+
+void UdpEndpoint::Impl::on_signal(int number) {
+    const bool first = !stopping;
+    if (number == SIGHUP) {
+        hooks->on_hangup();
+    } else if (number == SIGTERM && first && hooks->stop_within > Time::zero()) {
+        stopping = true;
+        session->finish_round();
+        stop_timer.expires_after(hooks->stop_within);
+        stop_timer.async_wait([this](const error_code& error) {
+            if (!error) interrupt();
+        });
+    } else {
+        interrupt();
+        return;
+    }
+    wait_for_signal();
+}
+
+void UdpEndpoint::Impl::interrupt() {
+    interrupted = true;
+    context.stop();
+}
+
+bool UdpEndpoint::run(Session& session, const RunHooks& hooks) {
     Impl& impl = *impl_;
     impl.session = &session;
-    impl.on_tick = &on_tick;
+    impl.hooks = &hooks;
+    impl.stopping = false;
     impl.interrupted = false;
-    impl.next_tick = now() + kTick;
     impl.batch.clear();
     impl.batch_sent = 0;
     impl.signals.add(SIGINT);
     impl.signals.add(SIGTERM);
-    impl.signals.async_wait([&impl](const error_code& error, int) {
-        if (error) return;
-        impl.interrupted = true;
-        impl.context.stop();
-    });
+    if (hooks.on_hangup) impl.signals.add(SIGHUP);
+    impl.wait_for_signal();
+    impl.wait_for_tick();
     asio::post(impl.context, [&impl] { impl.step(); });
     impl.context.restart();
     impl.context.run();
     impl.signals.clear();
-    return !impl.interrupted;
+    return !impl.interrupted && !session.cut_short();
 }
 
 std::string UdpEndpoint::peer() const {
     return to_text(impl_->peer);
+}
+std::string UdpEndpoint::peer_address() const {
+    return address_text(impl_->peer.address());
+}
+std::string UdpEndpoint::local_address() const {
+    error_code error;
+    const udp::endpoint local = impl_->socket.local_endpoint(error);
+    return error || local.address().is_unspecified() ? "" : address_text(local.address());
+}
+std::optional<Link> UdpEndpoint::link() const {
+    return link_of(impl_->socket.native_handle(), impl_->interface);
 }
 std::size_t UdpEndpoint::ip_udp_bytes() const {
     return impl_->ip_udp_bytes();
@@ -254,6 +419,20 @@ const EndpointCounts& UdpEndpoint::counts() const {
 
 Time UdpEndpoint::now() {
     return std::chrono::steady_clock::now().time_since_epoch();
+}
+
+void UdpEndpoint::tell_local(const std::string& socket, std::string_view lines) {
+    sockaddr_un address{};
+    if (socket.empty() || socket.size() >= sizeof address.sun_path) return;
+    address.sun_family = AF_UNIX;
+    std::copy(socket.begin(), socket.end(), address.sun_path);
+    if (socket[0] == '@') address.sun_path[0] = '\0';  // Linux's abstract namespace
+    const int descriptor = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (descriptor < 0) return;
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket.size());
+    (void)::sendto(descriptor, lines.data(), lines.size(), MSG_NOSIGNAL,
+                   reinterpret_cast<const sockaddr*>(&address), length);
+    ::close(descriptor);
 }
 
 }  // namespace ellicast::sender

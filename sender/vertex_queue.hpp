@@ -15,12 +15,11 @@ namespace ellicast::sender {
 /// logarithmic; memory: 20 bytes a vertex.
 class VertexQueue {
   public:
-    explicit VertexQueue(std::size_t vertices) : place_(vertices, kAbsent) {
-        heap_.reserve(vertices);
-    }
+    explicit VertexQueue(std::size_t vertices) : place_(vertices, kAbsent) {}
 
     [[nodiscard]] bool empty() const { return heap_.empty(); }
     [[nodiscard]] std::uint32_t first() const { return heap_.front().vertex; }
+    [[nodiscard]] double least() const { return heap_.front().cost; }  // of the first
 
     /// Puts a vertex in or changes its cost, which is a number (asserted).
     void set(std::uint32_t vertex, double cost) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <numeric>
 #include <utility>
 
 #include "common/octahedral_normal.hpp"
@@ -15,48 +14,32 @@ namespace {
 using common::Triangle;
 using protocol::VertexRecord;
 
-/// For each vertex of the model the index of its record.
-std::vector<std::uint32_t> record_indices(const std::vector<VertexRecord>& of_vertex,
-                                          const std::vector<VertexRecord>& records) {
-    std::vector<std::uint32_t> by_position(records.size());
-    std::iota(by_position.begin(), by_position.end(), 0u);
-    std::sort(by_position.begin(), by_position.end(), [&](std::uint32_t a, std::uint32_t b) {
-        return records[a].position < records[b].position;
-    });
-    std::vector<std::uint32_t> indices;
-    indices.reserve(of_vertex.size());
-    for (const VertexRecord& wanted : of_vertex) {
-        const auto found = std::lower_bound(
-            by_position.begin(), by_position.end(), wanted.position,
-            [&](std::uint32_t a, const auto& position) { return records[a].position < position; });
-        assert(found != by_position.end() && records[*found].position == wanted.position);
-        indices.push_back(*found);
-    }
-    return indices;
-}
-
-void set_normals(int bits, const PreparedModel& model, const std::vector<std::uint32_t>& index,
-                 std::vector<VertexRecord>& records) {
+void set_normals(int bits, const PreparedModel& model, const std::vector<std::uint32_t>& record_of,
+                 const std::vector<char>& marks, std::vector<VertexRecord>& records) {
     std::vector<Eigen::Vector3d> sums(records.size(), Eigen::Vector3d::Zero());
     for (const Triangle& face : model.faces) {
         const Eigen::Vector3d& a = model.vertices[face[0]];
         const Eigen::Vector3d area_vector =
             (model.vertices[face[1]] - a).cross(model.vertices[face[2]] - a);
-        for (const std::uint32_t v : face) sums[index[v]] += area_vector;
+        for (const std::uint32_t v : face) sums[record_of[v]] += area_vector;
+    }
+    std::vector<bool> marked(records.size(), false);
+    for (std::size_t v = 0; v < model.vertices.size(); ++v) {
+        if (marks[v] != 0) marked[record_of[v]] = true;
     }
     for (std::size_t k = 0; k < records.size(); ++k) {
-        records[k].normal = common::encode_normal(sums[k], bits);
+        records[k].normal = common::encode_marked_normal(sums[k], bits, marked[k]);
     }
 }
 
-void set_rings(const PreparedModel& model, const std::vector<std::uint32_t>& index,
+void set_rings(const PreparedModel& model, const std::vector<std::uint32_t>& record_of,
                std::vector<VertexRecord>& records) {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
     edges.reserve(6 * model.faces.size());
     for (const Triangle& face : model.faces) {
         for (std::size_t c = 0; c < 3; ++c) {
-            const std::uint32_t a = index[face[c]];
-            const std::uint32_t b = index[face[(c + 1) % 3]];
+            const std::uint32_t a = record_of[face[c]];
+            const std::uint32_t b = record_of[face[(c + 1) % 3]];
             if (a == b) continue;
             edges.emplace_back(a, b);
             edges.emplace_back(b, a);
@@ -75,11 +58,11 @@ void set_rings(const PreparedModel& model, const std::vector<std::uint32_t>& ind
     }
 }
 
-void set_colours(const PreparedModel& model, const std::vector<std::uint32_t>& index,
+void set_colours(const PreparedModel& model, const std::vector<std::uint32_t>& record_of,
                  std::vector<VertexRecord>& records) {
     assert(model.colours.size() == model.vertices.size());
     for (std::size_t v = model.vertices.size(); v-- > 0;) {  // so that the first one stays
-        records[index[v]].colour = model.colours[v];
+        records[record_of[v]].colour = model.colours[v];
     }
 }
 
@@ -92,12 +75,11 @@ protocol::RecordFormat record_format(const TagOptions& options, const PreparedMo
 }
 
 void set_tags(const protocol::RecordFormat& format, const PreparedModel& model,
-              const std::vector<VertexRecord>& of_vertex, std::vector<VertexRecord>& records) {
-    if (format == protocol::RecordFormat{}) return;
-    const std::vector<std::uint32_t> index = record_indices(of_vertex, records);
-    if (format.normal_bits > 0) set_normals(format.normal_bits, model, index, records);
-    if (format.ring) set_rings(model, index, records);
-    if (format.colour) set_colours(model, index, records);
+              const std::vector<std::uint32_t>& record_of, const std::vector<char>& marks,
+              std::vector<VertexRecord>& records) {
+    if (format.normal_bits > 0) set_normals(format.normal_bits, model, record_of, marks, records);
+    if (format.ring) set_rings(model, record_of, records);
+    if (format.colour) set_colours(model, record_of, records);
 }
 
 }  // namespace ellicast::sender

@@ -1,6 +1,7 @@
 // sender/vertex_tags.hpp
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "protocol/datagram.hpp"
@@ -13,21 +14,22 @@ struct TagOptions {
     int normal_bits = 8;  // 0, 8, 12 or 16
     bool ring = false;
     bool colour = true;  // where the model has it
+    bool edges = true;   // and edges that a receiver would get wrong (sender/costly_edges.hpp)
 };
 
 /// Of no use on the wire: only what the model has.
 protocol::RecordFormat record_format(const TagOptions& options, const PreparedModel& model);
 
-/// Fills the tags that the format asks for. `records` are the object's vertices in canonical order,
-/// distinct in position; `of_vertex` holds for every vertex of the model its position as a record,
-/// which must be among them (asserted). What several vertices that became one say is united:
-/// - normal: of the sum of the area vectors of the faces around it, seen from outside; code 0 where
-///   that is nothing (common/octahedral_normal.hpp);
+/// Fills the tags that the format asks for. `records` are the object's vertices in canonical order;
+/// `record_of` holds for every vertex of the model (and maybe more behind them) the index of its
+/// record. What several vertices that became one say is united:
+/// - normal: of the sum of the area vectors of the faces around it, seen from outside; marked where
+///   `marks` has it, one a vertex of the model or more (common/octahedral_normal.hpp);
 /// - ring: of its distinct neighbours along the model's edges (common/ring_tag.hpp);
 /// - colour: that of the first vertex of the model.
-/// Deterministic. Cost: that of a sort.
+/// Deterministic. Linear, but for a sort of the edges for rings.
 void set_tags(const protocol::RecordFormat& format, const PreparedModel& model,
-              const std::vector<protocol::VertexRecord>& of_vertex,
+              const std::vector<std::uint32_t>& record_of, const std::vector<char>& marks,
               std::vector<protocol::VertexRecord>& records);
 
 }  // namespace ellicast::sender

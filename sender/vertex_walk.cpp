@@ -77,24 +77,18 @@ VertexWalk::Pass VertexWalk::pass_at(std::uint32_t position) const {
     return pass;
 }
 
-std::vector<VertexRun> VertexWalk::runs(std::uint32_t begin, std::uint32_t count) const {
-    assert(begin <= sizes_.positions && count <= sizes_.positions - begin);
-    std::vector<VertexRun> result;
-    while (count > 0) {
-        const Pass pass = pass_at(begin);
-        const std::uint32_t within = begin - pass.begin;
-        const auto place =
-            static_cast<std::uint32_t>((std::uint64_t{within} + pass.start) % pass.length);
-        const std::uint32_t j = pass.class_of(place);
-        VertexRun run;
-        run.first = j + (place - pass.class_begin(j)) * pass.stride;
-        run.stride = pass.stride;
-        run.count = std::min({count, pass.class_begin(j + 1) - place, pass.length - within});
-        result.push_back(run);
-        begin += run.count;
-        count -= run.count;
-    }
-    return result;
+VertexRun VertexWalk::first_run(std::uint32_t begin, std::uint32_t count) const {
+    assert(begin <= sizes_.positions && count > 0 && count <= sizes_.positions - begin);
+    const Pass pass = pass_at(begin);
+    const std::uint32_t within = begin - pass.begin;
+    const auto place =
+        static_cast<std::uint32_t>((std::uint64_t{within} + pass.start) % pass.length);
+    const std::uint32_t j = pass.class_of(place);
+    VertexRun run;
+    run.first = j + (place - pass.class_begin(j)) * pass.stride;
+    run.stride = pass.stride;
+    run.count = std::min({count, pass.class_begin(j + 1) - place, pass.length - within});
+    return run;
 }
 
 }  // namespace ellicast::sender

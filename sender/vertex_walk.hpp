@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "protocol/datagram.hpp"
 
@@ -37,10 +36,18 @@ class VertexWalk {
     /// A function of its arguments. Requires 1 <= vertices <= positions, most >= 1 (asserted).
     VertexWalk(const WalkSizes& sizes, const protocol::ObjectId& id, std::uint32_t round);
 
-    /// The vertices at positions begin .. begin + count - 1, where count is at most the smaller of
-    /// `most` and `vertices`: one run; one more in later rounds, since no class is shorter than
-    /// `most`; and one more with copies, since no pass but the last is.
-    [[nodiscard]] std::vector<VertexRun> runs(std::uint32_t begin, std::uint32_t count) const;
+    /// Calls visit(run) for the vertices at positions begin .. begin + count - 1, where count is at
+    /// most the smaller of `most` and `vertices`: one run; one more in later rounds, since no class
+    /// is shorter than `most`; and one more with copies, since no pass but the last is.
+    template <class Visit>
+    void for_each_run(std::uint32_t begin, std::uint32_t count, Visit&& visit) const {
+        while (count > 0) {
+            const VertexRun run = first_run(begin, count);
+            visit(run);
+            begin += run.count;
+            count -= run.count;
+        }
+    }
 
   private:
     struct Pass {
@@ -52,6 +59,8 @@ class VertexWalk {
         [[nodiscard]] std::uint32_t class_begin(std::uint32_t j) const;
         [[nodiscard]] std::uint32_t class_of(std::uint32_t place) const;
     };
+    /// The longest run from a position on; requires count > 0.
+    [[nodiscard]] VertexRun first_run(std::uint32_t begin, std::uint32_t count) const;
     [[nodiscard]] std::uint32_t pass_length(std::uint32_t pass) const;
     [[nodiscard]] Pass pass_at(std::uint32_t position) const;
 

@@ -21,6 +21,7 @@
 #include "common/mesh_topology.hpp"
 #include "common/model_io.hpp"
 #include "common/random.hpp"
+#include "common/self_intersection.hpp"
 #include "common/triangle_intersection.hpp"
 #include "common/triangle_tree.hpp"
 #include "tests/support/meshes.hpp"

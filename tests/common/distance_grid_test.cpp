@@ -49,10 +49,9 @@ TEST_CASE("far nodes and the border are outside") {
     REQUIRE(grid.values[frame.index(8, 8, 8)] < 0);
 }
 
-TEST_CASE("order, copies and threads change no bit of the grid") {
-    Random random(3);
+std::vector<Ellipsoid> random_ellipsoids(Random& random, int count) {
     std::vector<Ellipsoid> ellipsoids;
-    for (int n = 0; n < 40; ++n) {
+    for (int n = 0; n < count; ++n) {
         Ellipsoid e;
         for (int a = 0; a < 3; ++a) e.center[a] = random.uniform() * 1.6 - 0.8;
         e.L << 0.05 + 0.2 * random.uniform(), 0, 0, 0.1 * random.uniform(),
@@ -60,6 +59,46 @@ TEST_CASE("order, copies and threads change no bit of the grid") {
             0.05 + 0.2 * random.uniform();
         ellipsoids.push_back(e);
     }
+    return ellipsoids;
+}
+
+// The header of common/ellipsoid.hpp, point by point.
+double plain_estimate(const Ellipsoid& e, const Eigen::Vector3d& x) {
+    const Eigen::Vector3d d = x - e.center;
+    const Eigen::Matrix3d A = (e.L * e.L.transpose()).inverse();
+    const double s = std::sqrt(d.dot(A * d));
+    return s > 0.0 ? s * (s - 1.0) / (A * d).norm() : -semi_axes(e)[0];
+}
+
+TEST_CASE("the grid holds the least estimate of all whose padded box holds the node") {
+    Random random(4);
+    std::vector<Ellipsoid> ellipsoids = random_ellipsoids(random, 25);
+    for (Ellipsoid& e : ellipsoids) e.L *= 2.0;  // so that they overlap
+    const GridFrame frame = frame_of(27);
+    ellipsoids.push_back(sphere(frame.position(20, 21, 22), 0.15));  // a node at d = 0
+    const DistanceGrid grid = make_distance_grid(ellipsoids, frame);
+    const double outside = grid.outside;
+    for (int k = 1; k < 26; ++k) {
+        for (int j = 1; j < 26; ++j) {
+            for (int i = 1; i < 26; ++i) {
+                const Eigen::Vector3d x = frame.position(i, j, k);
+                double least = outside;
+                for (const Ellipsoid& e : ellipsoids) {
+                    Eigen::AlignedBox3d box = bounding_box(e);
+                    box.min().array() -= 3.0 * frame.spacing;
+                    box.max().array() += 3.0 * frame.spacing;
+                    if (box.contains(x)) least = std::min(least, plain_estimate(e, x));
+                }
+                const double held = grid.values[frame.index(i, j, k)];
+                REQUIRE(held == Approx(std::max(least, -outside)).margin(1e-6));
+            }
+        }
+    }
+}
+
+TEST_CASE("order, copies and threads change no bit of the grid") {
+    Random random(3);
+    const std::vector<Ellipsoid> ellipsoids = random_ellipsoids(random, 40);
     const GridFrame frame = frame_of(30);
     const DistanceGrid once = make_distance_grid(ellipsoids, frame, 1);
     std::vector<Ellipsoid> again = ellipsoids;

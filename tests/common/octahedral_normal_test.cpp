@@ -105,6 +105,29 @@ TEST_CASE("the error stays below the stated angle and comes near it") {
     }
 }
 
+TEST_CASE("a code is marked or not as asked, and is still near the direction") {
+    Random random(7);
+    for (const int bits : {8, 12, 16}) {
+        CAPTURE(bits);
+        for (const bool marked : {false, true}) {
+            double sum = 0.0;
+            constexpr int kDirections = 20'000;
+            for (int k = 0; k < kDirections; ++k) {
+                const Vector3d n = any_direction(random);
+                const std::uint16_t code = encode_marked_normal(n, bits, marked);
+                REQUIRE(is_marked(code, bits) == marked);
+                const double error = angle(n, decode_normal(code, bits));
+                REQUIRE(error <= (marked ? 3.0 : 2.0) * normal_cell_angle(bits));
+                sum += error / normal_cell_angle(bits);
+            }
+            // 0.5 for the nearest of all codes.
+            CHECK(sum / kDirections < (marked ? 1.1 : 0.65));
+        }
+        CHECK_FALSE(is_marked(encode_marked_normal(Vector3d::Zero(), bits, false), bits));
+        CHECK(is_marked(encode_marked_normal(Vector3d::Zero(), bits, true), bits));
+    }
+}
+
 TEST_CASE("what has no direction gets code 0, and extremes of length do no harm") {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

@@ -1,9 +1,13 @@
 // tests/common/token_bucket_test.cpp
 #include "common/token_bucket.hpp"
 
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstdint>
 #include <deque>
+#include <numeric>
 
 #include "common/random.hpp"
 
@@ -52,6 +56,44 @@ TEST_CASE("how often and when the bucket is asked does not change the rate over 
     const double expected = static_cast<double>(rate);
     CHECK(bits <= expected * 1.005 + 2 * 8 * 1248);
     CHECK(bits >= expected * 0.99 - 2 * 8 * 1248);
+}
+
+TEST_CASE("every second carries the rate to 2 %, or to a datagram, however late we wake") {
+    const std::uint64_t rate =
+        GENERATE(100'000u, 1'000'000u, 10'000'000u, 100'000'000u, 1'000'000'000u);
+    const Time latest = GENERATE(Time(0ms), Time(1ms), Time(4ms));
+    CAPTURE(rate, latest.count());
+    constexpr std::size_t kBytes = 1228;
+    constexpr Time kLeastSleep = 200us;  // as the sender sleeps
+    constexpr Time kBurst = 5ms;
+    constexpr Time kSlot = 250ms;  // windows of a second begin at every quarter of one
+    constexpr std::size_t kSlots = 4;
+    constexpr Time kEnd = 6s;
+    Random random(rate + static_cast<std::uint64_t>(latest.count()));
+    TokenBucket bucket(rate, kBurst);
+    std::array<double, kEnd / kSlot> bits{};
+    double most_at_once = 0;
+    for (Time now{0}; now < kEnd;) {
+        double at_once = 0;
+        while (bucket.take(now, kBytes)) at_once += 8.0 * kBytes;
+        bits.at(static_cast<std::size_t>(now / kSlot)) += at_once;
+        most_at_once = std::max(most_at_once, at_once);
+        now = std::max(bucket.ready_at(), now + kLeastSleep);
+        const auto within = static_cast<std::uint64_t>(latest.count()) + 1;
+        now += Time(static_cast<std::int64_t>(random.below(within)));
+    }
+    // Of 100 kbit/s a datagram is a tenth of a second's bits: no second can be fairer than that.
+    const double asked = static_cast<double>(rate);
+    const double allowed = std::max(0.02 * asked, 8.0 * kBytes);
+    for (std::size_t first = 0; first + kSlots <= bits.size(); ++first) {
+        const auto* const begin = bits.data() + first;
+        const double second = std::accumulate(begin, begin + kSlots, 0.0);
+        CAPTURE(first);
+        CHECK(std::abs(second - asked) <= allowed);
+    }
+    const double all = std::accumulate(bits.begin(), bits.end(), 0.0);
+    CHECK(all == Approx(6.0 * asked).epsilon(0.02));
+    CHECK(most_at_once <= asked * 0.005 + 8.0 * kBytes);  // the burst is bounded
 }
 
 TEST_CASE("no stretch of time carries more than rate times stretch and burst, and a datagram") {

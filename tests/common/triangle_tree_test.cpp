@@ -182,9 +182,6 @@ TEST_CASE("an empty tree has no closest triangle") {
     const TriangleTree tree{TriangleMesh{}};
     CHECK(tree.empty());
     CHECK(tree.closest(Vector3d::Zero()).triangle == kNone);
-    std::vector<std::uint32_t> found{1, 2};
-    tree.find_meeting({Vector3d::Constant(-1), Vector3d::Constant(1)}, found);
-    CHECK(found.empty());
 }
 
 TEST_CASE("the tree finds what brute force finds, bit for bit, in random soups") {
@@ -266,25 +263,4 @@ TEST_CASE("triangles in one place do not make the tree deep") {
     }
     Random random(5);
     require_agreement(mesh, random, 20, 12.0);
-}
-
-TEST_CASE("find_meeting lists exactly the triangles whose boxes meet the box") {
-    const std::uint64_t seed = GENERATE(range(1, 6));
-    CAPTURE(seed);
-    Random random(seed);
-    const TriangleMesh mesh = random_soup(random, 300);
-    const TriangleTree tree(mesh);
-    std::vector<std::uint32_t> found;
-    for (int q = 0; q < 200; ++q) {
-        Eigen::AlignedBox3d box(random_point(random, 1.0));
-        if (q % 4 != 0) box.extend(random_point(random, 1.0));
-        tree.find_meeting(box, found);
-        std::vector<std::uint32_t> expected;
-        for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-            Eigen::AlignedBox3d own;
-            for (const std::uint32_t corner : mesh.triangles[i]) own.extend(mesh.positions[corner]);
-            if (own.intersects(box)) expected.push_back(i);
-        }
-        REQUIRE(found == expected);
-    }
 }

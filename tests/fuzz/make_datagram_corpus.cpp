@@ -1,11 +1,7 @@
 // tests/fuzz/make_datagram_corpus.cpp: writes the seeds of corpus/datagram, the same at every run.
 //     build/release/tests/fuzz/make_datagram_corpus tests/fuzz/corpus/datagram
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <string>
-
 #include "protocol/datagram.hpp"
+#include "tests/fuzz/corpus_writer.hpp"
 #include "tests/protocol/golden_datagram.hpp"
 #include "tests/protocol/wire_samples.hpp"
 
@@ -48,6 +44,18 @@ Bytes description_only() {
     return writer.finish();
 }
 
+Bytes page_only() {
+    DatagramWriter writer(sample_header(), kMinDatagramBytes);
+    (void)writer.add_page(golden_page());
+    return writer.finish();
+}
+
+Bytes edges_only() {
+    DatagramWriter writer(sample_header(), kMinDatagramBytes);
+    writer.add_edges(std::vector<EdgeRecord>{{50'000, 3, 4}, {50'000, 0, 49'999}});
+    return writer.finish();
+}
+
 Bytes unknown_kinds() {
     return datagram_with(
         from_hex("c8 00 03 01 02 03 04 00 00 02 00 16 00 01 00 00 00 07 00 00 00 01 "
@@ -63,32 +71,21 @@ Bytes most_sections() {
     return writer.finish();
 }
 
-bool write(const std::filesystem::path& folder, const char* name, const Bytes& bytes) {
-    const std::string text(bytes.begin(), bytes.end());
-    std::ofstream file(folder / name, std::ios::binary);
-    file << text;
-    return static_cast<bool>(file.flush());
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 2) {
-        std::fprintf(stderr, "usage: make_datagram_corpus FOLDER\n");
-        return 2;
-    }
-    const std::filesystem::path folder = argv[1];
-    const bool written = write(folder, "golden", from_hex(kGoldenHex)) &&
-                         write(folder, "golden-tagged", from_hex(kGoldenTaggedHex)) &&
-                         write(folder, "tagged-12", tagged_vertices(12)) &&
-                         write(folder, "tagged-16", tagged_vertices(16)) &&
-                         write(folder, "ellipsoids", ellipsoids_only()) &&
-                         write(folder, "vertices", vertices_only()) &&
-                         write(folder, "description", description_only()) &&
-                         write(folder, "unknown-kinds", unknown_kinds()) &&
-                         write(folder, "most-sections", most_sections()) &&
-                         write(folder, "no-section", datagram_with({})) &&
-                         write(folder, "too-short", Bytes(20, 0x80));
-    if (!written) std::fprintf(stderr, "make_datagram_corpus: cannot write to %s\n", argv[1]);
-    return written ? 0 : 2;
+    return write_corpus(argc, argv,
+                        {{"golden", from_hex(kGoldenHex)},
+                         {"golden-tagged", from_hex(kGoldenTaggedHex)},
+                         {"tagged-12", tagged_vertices(12)},
+                         {"tagged-16", tagged_vertices(16)},
+                         {"ellipsoids", ellipsoids_only()},
+                         {"vertices", vertices_only()},
+                         {"description", description_only()},
+                         {"page", page_only()},
+                         {"edges", edges_only()},
+                         {"unknown-kinds", unknown_kinds()},
+                         {"most-sections", most_sections()},
+                         {"no-section", datagram_with({})},
+                         {"too-short", Bytes(20, 0x80)}});
 }

@@ -1,10 +1,6 @@
 // tests/fuzz/make_receiver_corpus.cpp: writes the seeds of corpus/receiver, the same at every run.
 //     build/release/tests/fuzz/make_receiver_corpus tests/fuzz/corpus/receiver
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <string>
-
+#include "tests/fuzz/corpus_writer.hpp"
 #include "tests/fuzz/receiver_script.hpp"
 #include "tests/support/datagrams.hpp"
 
@@ -91,27 +87,40 @@ ReceiverScript contradictions() {
     return script;
 }
 
-bool write(const std::filesystem::path& folder, const char* name, const ReceiverScript& script) {
-    const auto bytes = encode_script(script);
-    std::ofstream file(folder / name, std::ios::binary);
-    file << std::string(bytes.begin(), bytes.end());
-    return static_cast<bool>(file.flush());
+/// Two pages of a carousel, of which one changes.
+ReceiverScript carousel() {
+    ReceiverScript script{.set_up = 16, .steps = {}};
+    const MadeStream stream = small_stream(1, 0);
+    std::vector<MadeObject> objects{made_sphere(40, 4, 1), made_sphere(50, 3, 2)};
+    objects[1].description.name = "second";
+    for (std::uint32_t version = 1; version <= 2; ++version) {
+        for (std::uint16_t page = 0; page < 2; ++page) {
+            const MadeObject& object = objects[page];
+            protocol::PageEntry entry;
+            entry.page = page;
+            entry.pages = 2;
+            entry.version = page == 0 ? version : 1;
+            entry.object = object.id;
+            entry.name = object.description.name;
+            protocol::DatagramWriter writer(made_header(object, stream),
+                                            protocol::kMinDatagramBytes);
+            if (writer.add_page(entry)) script.steps.push_back({kFixChecksum, writer.finish()});
+            append(script, made_datagrams(object, stream), kFixChecksum | pause(1));
+        }
+        objects[0] = made_sphere(40, 4, 7);
+    }
+    return script;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 2) {
-        std::fprintf(stderr, "usage: make_receiver_corpus FOLDER\n");
-        return 2;
-    }
-    const std::filesystem::path folder = argv[1];
-    const bool written = write(folder, "whole-object", whole_object()) &&
-                         write(folder, "rounds-with-loss", rounds_with_loss()) &&
-                         write(folder, "restarted-sender", restarted_sender()) &&
-                         write(folder, "strangers", strangers_in_little_room()) &&
-                         write(folder, "contradictions", contradictions()) &&
-                         write(folder, "tagged-objects", tagged_objects());
-    if (!written) std::fprintf(stderr, "make_receiver_corpus: cannot write to %s\n", argv[1]);
-    return written ? 0 : 2;
+    return tests::write_corpus(argc, argv,
+                               {{"whole-object", tests::encode_script(whole_object())},
+                                {"rounds-with-loss", tests::encode_script(rounds_with_loss())},
+                                {"restarted-sender", tests::encode_script(restarted_sender())},
+                                {"strangers", tests::encode_script(strangers_in_little_room())},
+                                {"contradictions", tests::encode_script(contradictions())},
+                                {"carousel", tests::encode_script(carousel())},
+                                {"tagged-objects", tests::encode_script(tagged_objects())}});
 }

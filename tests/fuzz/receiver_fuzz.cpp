@@ -38,6 +38,7 @@ SessionOptions options_of(const ReceiverScript& script) {
         options.loss.duplicate = 0.3;
         options.loss.corrupt = 0.1;
     }
+    options.pages.all = (script.set_up & 16) != 0;
     if ((script.set_up & 8) != 0) {
         options.limits.groups = kTightGroups;
         options.limits.vertices = 4096;
@@ -96,6 +97,15 @@ void check_session(const Session& session, const SessionOptions& options, Time n
         held += group.ellipsoids.bytes() + group.vertices.bytes();
     }
     require(held == store.bytes(), "the budget is what the tables hold");
+    const auto& contents = session.catalogue().all();
+    require(contents.size() <= options.limits.groups, "tables of contents stay below the limit");
+    for (const auto& table : contents) {
+        require(table.lines.size() <= options.limits.groups, "their lines do");
+        require(table.replaced.size() <= 256, "and what was replaced");
+    }
+    for (const auto& page : session.pages()) {
+        require(!page.versions.empty(), "a page has a version");
+    }
     const auto next = session.next_wakeup();
     require(!next || *next >= Time::min() + 1s, "the next wake-up is a time");
     const auto object = store.snapshot();

@@ -20,7 +20,7 @@ struct ScriptStep {
 /// How the session is set up, then what happens. Any bytes are a script, and a script survives
 /// encoding and decoding.
 struct ReceiverScript {
-    /// Bits 0-1: Until. Bit 2: simulated loss. Bit 3: tight limits.
+    /// Bits 0-1: Until. Bit 2: simulated loss. Bit 3: tight limits. Bit 4: all pages.
     std::uint8_t set_up = 0;
     std::vector<ScriptStep> steps;
 };

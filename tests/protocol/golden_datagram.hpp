@@ -118,6 +118,47 @@ inline protocol::Description golden_description() {
     return {"horse", {0.5, -1024.0, 3.0}, "mm", "", "0.1.0"};
 }
 
+/// A whole section: page 1 of 3, version 2.
+inline constexpr const char* kGoldenPageHex =
+    // clang-format off
+    "04 "  // page
+    "00 24 "  // length
+    "00 01 "  // page
+    "00 03 "  // pages
+    "00 00 00 02 "  // version
+    "a0 a1 a2 a3 a4 a5 a6 a7 "  // object
+    "00 00 00 02 "  // components
+    "ff ff ff fc "  // Euler characteristic, all
+    "01 90 "  // ellipsoids
+    "00 00 bd 65 "  // vertices
+    "05 68 6f 72 73 65 ";  // name
+// clang-format on
+
+inline protocol::PageEntry golden_page() {
+    protocol::PageEntry entry;
+    entry.page = 1;
+    entry.pages = 3;
+    entry.version = 2;
+    entry.object = {0xa0, 0xa1, 0xa2, 0xa3, 0xa4, 0xa5, 0xa6, 0xa7};
+    entry.components = 2;
+    entry.euler_all = -4;
+    entry.ellipsoids = 400;
+    entry.vertices = 48485;
+    entry.name = "horse";
+    return entry;
+}
+
+/// A whole section: two edges of what is left of 48485 vertices when half of them are gone.
+inline constexpr const char* kGoldenEdgesHex =
+    // clang-format off
+    "05 "  // edges
+    "00 16 "  // length: 22 = 6 + 2 * 8
+    "00 02 "  // count
+    "00 00 5e b3 "  // among: 24243
+    "00 00 00 07 " "00 00 04 04 "
+    "00 00 00 00 " "00 00 5e b2 ";
+// clang-format on
+
 /// Index 399.
 inline protocol::EllipsoidRecord golden_ellipsoid() {
     return {{0.25f, -1.5f, 2.0f, 0.5f, 0.125f, 0.75f, -0.25f, 0.0f, 1.0f}};

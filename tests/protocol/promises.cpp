@@ -52,10 +52,30 @@ std::string broken_by_records(const SectionView& section, const Hint& hint) {
     return "";
 }
 
+std::string broken_by_page(const PageEntry& entry) {
+    if (entry.page >= entry.pages) return "page";
+    if (entry.version == 0) return "version";
+    if (entry.components == 0 || entry.euler_all % 2 != 0) return "topology";
+    return entry.name.size() <= kMaxPageNameBytes && is_presentable(entry.name) ? "" : "page name";
+}
+
+std::string broken_by_edges(const SectionView& section, const Hint& hint) {
+    if (section.count == 0) return "count";
+    for (std::size_t k = 0; k < section.count; ++k) {
+        const EdgeRecord edge = section.edge(k);
+        if (edge.a >= edge.b || edge.b >= edge.among || edge.among > hint.vertices) return "edge";
+    }
+    return "";
+}
+
 std::string broken_by(const SectionView& section, const Hint& hint) {
     switch (section.kind) {
         case SectionKind::description:
             return broken_by_description(section.description());
+        case SectionKind::page:
+            return broken_by_page(section.page());
+        case SectionKind::edges:
+            return broken_by_edges(section, hint);
         case SectionKind::ellipsoids:
         case SectionKind::vertices:
             return broken_by_records(section, hint);
@@ -66,6 +86,12 @@ std::string broken_by(const SectionView& section, const Hint& hint) {
 void add_again(DatagramWriter& writer, const SectionView& section) {
     if (section.kind == SectionKind::description) {
         (void)writer.add_description(section.description());
+    } else if (section.kind == SectionKind::page) {
+        (void)writer.add_page(section.page());
+    } else if (section.kind == SectionKind::edges) {
+        std::vector<EdgeRecord> edges(section.count);
+        for (std::size_t k = 0; k < edges.size(); ++k) edges[k] = section.edge(k);
+        writer.add_edges(edges);
     } else if (section.kind == SectionKind::ellipsoids) {
         std::vector<EllipsoidRecord> records(section.count);
         for (std::size_t k = 0; k < records.size(); ++k) records[k] = section.ellipsoid(k);

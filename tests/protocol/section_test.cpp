@@ -73,7 +73,7 @@ EllipsoidRecord sphere(double r) {
 }  // namespace
 
 TEST_CASE("sections of unknown kinds are skipped by their length") {
-    for (const int kind : {0, 4, 5, 77, 255}) {
+    for (const int kind : {0, 6, 77, 255}) {
         Bytes sections = unknown_section(static_cast<std::uint8_t>(kind), 33);
         const Bytes vertices = vertices_section(4, 2, 3);
         sections.insert(sections.end(), vertices.begin(), vertices.end());

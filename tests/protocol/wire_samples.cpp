@@ -8,6 +8,7 @@
 #include <string>
 
 #include "protocol/crc32c.hpp"
+#include "protocol/description.hpp"
 
 namespace ellicast::tests {
 namespace {
@@ -66,6 +67,20 @@ std::string random_text(common::Random& random) {
     const std::size_t length = random.below(40);
     for (std::size_t k = 0; k < length; ++k) text += static_cast<char>(' ' + random.below(95));
     return text + (random.chance(0.3) ? "\u00e9\u4e2d\U0001f40e" : "");
+}
+
+PageEntry random_page(common::Random& random) {
+    PageEntry entry;
+    entry.pages = static_cast<std::uint16_t>(1 + random.below(0xffff));
+    entry.page = static_cast<std::uint16_t>(random.below(entry.pages));
+    entry.version = static_cast<std::uint32_t>(1 + random.below(0xffffffff));
+    for (auto& byte : entry.object) byte = static_cast<std::uint8_t>(random.next());
+    entry.components = static_cast<std::uint32_t>(1 + random.below(kMaxComponents));
+    entry.euler_all = 2 - 2 * static_cast<std::int32_t>(random.below(1000));
+    entry.ellipsoids = static_cast<std::uint16_t>(random.next());
+    entry.vertices = static_cast<std::uint32_t>(random.below(kMaxVertices));
+    entry.name = presentable(random_text(random), kMaxPageNameBytes);
+    return entry;
 }
 
 /// First and stride for `count` records below `total`.
@@ -166,6 +181,20 @@ std::vector<EllipsoidRecord> random_ellipsoids(std::size_t count, const Hint& hi
     return records;
 }
 
+std::vector<EdgeRecord> random_edges(std::size_t count, const Hint& hint, common::Random& random) {
+    const auto below = [&](std::uint32_t limit) {
+        return static_cast<std::uint32_t>(random.below(limit));
+    };
+    std::vector<EdgeRecord> edges(count);
+    const std::uint32_t among = 2 + below(hint.vertices - 1);
+    for (EdgeRecord& edge : edges) {
+        edge.among = among;
+        edge.b = 1 + below(among - 1);
+        edge.a = below(edge.b);
+    }
+    return edges;
+}
+
 Bytes sample_datagram(std::uint64_t seed) {
     common::Random random(seed);
     const DatagramHeader header = sample_header();
@@ -190,7 +219,7 @@ RandomDatagram random_datagram(std::uint64_t seed) {
             std::min<std::size_t>(writer.ellipsoids_that_fit(), hint.ellipsoids);
         const std::size_t vertices =
             std::min<std::size_t>(writer.vertices_that_fit(), hint.vertices);
-        section.kind = static_cast<SectionKind>(1 + random.below(3));
+        section.kind = static_cast<SectionKind>(1 + random.below(5));
         if (section.kind == SectionKind::ellipsoids && ellipsoids > 0) {
             const std::size_t count = 1 + random.below(ellipsoids);
             section.ellipsoids = random_ellipsoids(count, hint, random);
@@ -201,6 +230,13 @@ RandomDatagram random_datagram(std::uint64_t seed) {
             section.vertices = random_vertices(count, hint, random);
             random_place(section, count, hint.vertices, random);
             writer.add_vertices(section.first, section.stride, section.vertices);
+        } else if (section.kind == SectionKind::edges && hint.vertices > 1 &&
+                   writer.edges_that_fit() > 0) {
+            section.edges = random_edges(1 + random.below(writer.edges_that_fit()), hint, random);
+            writer.add_edges(section.edges);
+        } else if (section.kind == SectionKind::page) {
+            section.page = random_page(random);
+            if (!writer.add_page(section.page)) continue;
         } else {
             section.kind = SectionKind::description;
             section.description = {random_text(random),

@@ -32,6 +32,10 @@ std::vector<protocol::EllipsoidRecord> random_ellipsoids(std::size_t count,
                                                          const protocol::Hint& hint,
                                                          common::Random& random);
 
+/// Between any of the vertices; requires two of them.
+std::vector<protocol::EdgeRecord> random_edges(std::size_t count, const protocol::Hint& hint,
+                                               common::Random& random);
+
 /// The sample's header with another record format.
 protocol::DatagramHeader sample_header(const protocol::RecordFormat& format);
 
@@ -49,6 +53,8 @@ struct RandomDatagram {
         std::vector<protocol::EllipsoidRecord> ellipsoids;
         std::vector<protocol::VertexRecord> vertices;
         protocol::Description description;
+        protocol::PageEntry page;
+        std::vector<protocol::EdgeRecord> edges;
     };
     std::vector<Section> sections;
     std::size_t capacity = 0;

@@ -8,6 +8,7 @@
 
 #include "common/mesh_topology.hpp"
 #include "common/random.hpp"
+#include "common/self_intersection.hpp"
 #include "common/vertex_normals.hpp"
 #include "receiver/surface_mesh.hpp"
 #include "receiver/vertex_removal.hpp"
@@ -22,6 +23,7 @@ namespace {
 
 constexpr double kNoTrust = 1e6;   // doubt with which the guide counts for nothing
 constexpr double kOneLevel = 1e6;  // cell with which no edge is long
+constexpr Gaps kFull{0.0, 1.0};    // all that an edge asks for
 
 std::vector<KnownVertex> estimated(const TriangleMesh& mesh, double doubt) {
     std::vector<KnownVertex> known;
@@ -30,10 +32,10 @@ std::vector<KnownVertex> estimated(const TriangleMesh& mesh, double doubt) {
 }
 
 // With the mesh itself as the guide.
-TriangleMesh concealed(const TriangleMesh& mesh, double doubt, double cell, double strength = 1.0,
-                       unsigned threads = 1) {
+TriangleMesh concealed(const TriangleMesh& mesh, double doubt, double cell,
+                       const Gaps& gaps = kFull, unsigned threads = 1) {
     const common::TriangleTree guide(mesh);
-    return conceal(mesh, estimated(mesh, doubt), {&guide, cell}, strength, threads).mesh;
+    return conceal(mesh, estimated(mesh, doubt), {&guide, cell}, gaps, threads).mesh;
 }
 
 TriangleMesh thinned(const TriangleMesh& mesh, double kept, std::uint64_t seed) {
@@ -95,7 +97,7 @@ TEST_CASE("concealment keeps positions in their places, and the topology") {
 
 TEST_CASE("on a sphere, normals alone bring most midpoints nearer to it than the chord") {
     const TriangleMesh mesh = thinned(tests::icosphere(3), 0.6, 5);
-    const TriangleMesh flat = concealed(mesh, kNoTrust, kOneLevel, 1e-9);
+    const TriangleMesh flat = concealed(mesh, kNoTrust, kOneLevel, {0.0, 1e-9});
     const TriangleMesh curved = concealed(mesh, kNoTrust, kOneLevel);
     REQUIRE(flat.positions.size() == curved.positions.size());
     REQUIRE(curved.positions.size() == mesh.positions.size() + edges_of(mesh));
@@ -120,14 +122,14 @@ TEST_CASE("a guide that was right at the ends is followed between them") {
     const common::TriangleTree sphere(tests::icosphere(5));
     std::vector<KnownVertex> known = estimated(mesh, 0.0);
     for (KnownVertex& vertex : known) vertex.normal.setZero();  // normals ask for nothing
-    const TriangleMesh result = conceal(mesh, known, {&sphere, kOneLevel}, 1.0, 1).mesh;
+    const TriangleMesh result = conceal(mesh, known, {&sphere, kOneLevel}, kFull, 1).mesh;
     REQUIRE(result.positions.size() == mesh.positions.size() + edges_of(mesh));
     for (std::size_t v = mesh.positions.size(); v < result.positions.size(); ++v) {
         REQUIRE(result.positions[v].norm() == Approx(1.0).margin(0.01));  // the chords': 0.96
     }
     // One that was wrong there is not: then only the other diagonal speaks, and softly.
     for (KnownVertex& vertex : known) vertex.doubt = kNoTrust;
-    const TriangleMesh doubtful = conceal(mesh, known, {&sphere, kOneLevel}, 1.0, 1).mesh;
+    const TriangleMesh doubtful = conceal(mesh, known, {&sphere, kOneLevel}, kFull, 1).mesh;
     for (std::size_t v = mesh.positions.size(); v < doubtful.positions.size(); ++v) {
         REQUIRE(doubtful.positions[v].norm() < 0.97);
     }
@@ -183,7 +185,7 @@ TEST_CASE("triangles are cut to fit whatever sides are split") {
                 tilted[v].normal = (tilted[v].normal + 0.4 * mesh.positions[v]).normalized();
             }
         }
-        const TriangleMesh result = conceal(mesh, tilted, {&guide, kOneLevel}, 1.0, 1).mesh;
+        const TriangleMesh result = conceal(mesh, tilted, {&guide, kOneLevel}, kFull, 1).mesh;
         CHECK(result.positions.size() > mesh.positions.size() + 20);
         CHECK(result.positions.size() < mesh.positions.size() + edges_of(mesh) - 20);
         require_positions_kept(mesh, result);
@@ -197,30 +199,73 @@ TEST_CASE("triangles are cut to fit whatever sides are split") {
     }
 }
 
-TEST_CASE("without strength nothing changes") {
+TEST_CASE("where nothing is missing nothing changes") {
     const TriangleMesh mesh = thinned(tests::torus(1, 0.4, 30, 15), 0.5, 2);
-    const TriangleMesh result = concealed(mesh, 0.0, 0.01, 0.0);
+    const TriangleMesh result = concealed(mesh, 0.0, 0.01, Gaps{});
     CHECK(result.positions == mesh.positions);
     CHECK(result.triangles == mesh.triangles);
 }
 
-TEST_CASE("strength scales what is added") {
+TEST_CASE("the less is missing, the less is added") {
     const TriangleMesh mesh = tests::icosphere(2);
-    const TriangleMesh full = concealed(mesh, kNoTrust, kOneLevel);
-    const TriangleMesh half = concealed(mesh, kNoTrust, kOneLevel, 0.5);
-    const TriangleMesh flat = concealed(mesh, kNoTrust, kOneLevel, 1e-9);
-    REQUIRE(full.positions.size() == half.positions.size());
-    for (std::size_t v = mesh.positions.size(); v < full.positions.size(); ++v) {
-        const Vector3d middle = 0.5 * (full.positions[v] + flat.positions[v]);
-        REQUIRE((half.positions[v] - middle).norm() < 1e-6);
+    double before = 0.0;
+    for (const double missing : {0.01, 0.1, 0.3, 0.6, 1.0}) {
+        const TriangleMesh result = concealed(mesh, kNoTrust, kOneLevel, {missing, 0.0});
+        double height = 0.0;
+        for (std::size_t v = mesh.positions.size(); v < result.positions.size(); ++v) {
+            height += result.positions[v].norm();
+        }
+        height /= static_cast<double>(edges_of(mesh));
+        CAPTURE(missing, height);
+        CHECK(height > before);
+        before = height;
     }
+}
+
+TEST_CASE("where little is missing, edges across a gap bulge and the others hardly") {
+    // A sphere that lacks one vertex of each patch.
+    TriangleMesh mesh = tests::icosphere(3);
+    std::optional<SurfaceMesh> surface = SurfaceMesh::from(mesh);
+    REQUIRE(surface);
+    const std::size_t lost = tests::icosphere(0).positions.size();
+    remove_vertices(*surface, [&](VertexId v) { return v < lost; });
+    mesh = surface->extract();
+    const common::TriangleTree guide(mesh);
+    const auto share_of_bulge = [&](const Gaps& gaps) {
+        const Concealed all =
+            conceal(mesh, estimated(mesh, kNoTrust), {&guide, kOneLevel}, kFull, 1);
+        const Concealed result =
+            conceal(mesh, estimated(mesh, kNoTrust), {&guide, kOneLevel}, gaps, 1);
+        REQUIRE(result.parents == all.parents);
+        std::array<double, 2> sums{};   // of the edges of usual length, and of the longer ones
+        std::array<double, 2> whole{};  // with all that there is to bulge
+        for (std::size_t k = 0; k < all.parents.size(); ++k) {
+            const Vector3d& a = mesh.positions[all.parents[k][0]];
+            const Vector3d& b = mesh.positions[all.parents[k][1]];
+            const std::size_t across = (a - b).norm() > 0.19 ? 1 : 0;  // usual are 0.14 to 0.16
+            const std::size_t v = mesh.positions.size() + k;
+            sums[across] += (result.mesh.positions[v] - 0.5 * (a + b)).norm();
+            whole[across] += (all.mesh.positions[v] - 0.5 * (a + b)).norm();
+        }
+        REQUIRE(whole[1] > 0.0);
+        return std::array{sums[0] / whole[0], sums[1] / whole[1]};
+    };
+    const auto [usual, across] = share_of_bulge({0.1, 0.0});
+    CAPTURE(usual, across);
+    CHECK(usual < 0.25);
+    CHECK(across > 0.4);
+    CHECK(across > 2.0 * usual);
+    CHECK(share_of_bulge({0.5, 0.0})[0] > 0.8);
+    const auto [least, more] = share_of_bulge({0.1, 0.5});
+    CHECK(least == Approx(0.5));
+    CHECK(more >= across);
 }
 
 TEST_CASE("only edges longer than two cells are split again, at most twice") {
     const TriangleMesh mesh = tests::icosphere(1);  // edges of 0.55 and 0.62
     const common::TriangleTree sphere(tests::icosphere(5));
     const auto size = [&](double cell) {
-        return conceal(mesh, estimated(mesh, 0.0), {&sphere, cell}, 1.0, 1).mesh.positions.size();
+        return conceal(mesh, estimated(mesh, 0.0), {&sphere, cell}, kFull, 1).mesh.positions.size();
     };
     CHECK(size(1.0) == 162);     // icosphere(2)
     CHECK(size(0.12) == 642);    // halves of 0.28 and 0.31
@@ -230,7 +275,8 @@ TEST_CASE("only edges longer than two cells are split again, at most twice") {
 TEST_CASE("guessed vertices know the edge that they split") {
     const TriangleMesh mesh = tests::icosphere(1);
     const common::TriangleTree guide(mesh);
-    const Concealed result = conceal(mesh, estimated(mesh, kNoTrust), {&guide, 0.1}, 1e-9, 1);
+    const Concealed result =
+        conceal(mesh, estimated(mesh, kNoTrust), {&guide, 0.1}, {0.0, 1e-9}, 1);
     const auto& positions = result.mesh.positions;
     REQUIRE(positions.size() == mesh.positions.size() + result.parents.size());
     for (std::size_t k = 0; k < result.parents.size(); ++k) {
@@ -252,7 +298,7 @@ TEST_CASE("guesses that make two near sheets intersect are taken back, and no ot
         normal = Vector3d(-0.8 * p.x(), -0.8 * p.y(), p.z() > 0 ? 1 : -1).normalized();
     }
     const common::TriangleTree guide(mesh);
-    Concealed result = conceal(mesh, known, {&guide, kOneLevel}, 1.0, 1);
+    Concealed result = conceal(mesh, known, {&guide, kOneLevel}, kFull, 1);
     const TriangleMesh before = result.mesh;
     REQUIRE(common::count_self_intersections(before, 1).faces > 0);
     Concealed other = result;
@@ -298,8 +344,8 @@ TEST_CASE("all points in one place stay as they are") {
 
 TEST_CASE("threads change no bit of what is guessed") {
     const TriangleMesh mesh = thinned(tests::torus(1, 0.4, 50, 25), 0.4, 9);
-    const TriangleMesh one = concealed(mesh, 0.01, 0.03);
-    const TriangleMesh many = concealed(mesh, 0.01, 0.03, 1.0, 7);
+    const TriangleMesh one = concealed(mesh, 0.01, 0.03, {0.3, 0.0});
+    const TriangleMesh many = concealed(mesh, 0.01, 0.03, {0.3, 0.0}, 7);
     CHECK(one.positions == many.positions);
     CHECK(one.triangles == many.triangles);
 }

@@ -204,6 +204,39 @@ TEST_CASE("with nothing received, nothing is complete") {
     for (const float d : confidence.distance) REQUIRE(d == diagonal);
 }
 
+TEST_CASE("distances are those of the shortest paths, at every share of received vertices") {
+    common::TriangleMesh mesh = tests::torus(1.0, 0.3, 40, 20);
+    for (std::size_t v = 0; v < mesh.positions.size(); v += 7) {
+        mesh.positions[v] = mesh.positions[mesh.triangles[v][0]];  // some coincide
+    }
+    common::Random random(9);
+    const double share = GENERATE(0.002, 0.05, 0.3, 0.9);
+    const Vertices received =
+        vertices_where(mesh, [&](const Vector3d&) { return random.chance(share); });
+    REQUIRE_FALSE(received.empty());
+    // Every edge, again and again, until nothing changes.
+    const double farthest = common::bounding_box(mesh.positions).diagonal().norm();
+    std::vector<double> least(mesh.positions.size(), farthest);
+    for (const std::uint32_t v : received) least[v] = 0.0;
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (const common::Triangle& t : mesh.triangles) {
+            for (std::size_t c = 0; c < 3; ++c) {
+                const std::uint32_t v = t[c];
+                const std::uint32_t u = t[(c + 1) % 3];
+                const double through_v = least[v] + (mesh.positions[u] - mesh.positions[v]).norm();
+                if (!(through_v < least[u])) continue;
+                least[u] = through_v;
+                changed = true;
+            }
+        }
+    }
+    const Confidence confidence = measure_confidence(mesh, received, 10, 1);
+    for (std::size_t v = 0; v < least.size(); ++v) {
+        REQUIRE(confidence.distance[v] == static_cast<float>(least[v]));
+    }
+}
+
 TEST_CASE("coincident points and huge counts give finite values between 0 and 1") {
     common::TriangleMesh mesh = tests::icosphere(2);
     const bool all_in_one = GENERATE(false, true);

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "common/mesh_distance.hpp"
 #include "common/mesh_topology.hpp"
@@ -111,6 +112,32 @@ TEST_CASE("smoothing flips restore the creases of a box") {
     }
 }
 
+TEST_CASE("a diagonal between two marked vertices stays against creases, and others do not") {
+    SurfaceMesh mesh = surface(tests::icosphere(3));
+    const HalfedgeId h = 3 * 100;
+    REQUIRE(mesh.can_flip(h));
+    mesh.flip(h);
+    const std::set ends{mesh.from_vertex(h), mesh.to_vertex(h)};
+    const auto still_there = [&](const SurfaceMesh& m) {
+        for (HalfedgeId k = 0; k < 3 * m.face_slots(); ++k) {
+            if (std::set{m.from_vertex(k), m.to_vertex(k)} == ends) return true;
+        }
+        return false;
+    };
+    std::vector<char> marks(mesh.vertex_slots(), 0);
+    marks[*ends.begin()] = 1;
+    SurfaceMesh half = mesh;
+    flip_to_smooth(half, {.weights = {.mark = 2.0}, .marks = marks});
+    CHECK_FALSE(still_there(half));
+    marks[*ends.rbegin()] = 1;
+    SurfaceMesh both = mesh;
+    CHECK(flip_to_smooth(both, {.weights = {.mark = 2.0}, .marks = marks}) == 0);
+    CHECK(still_there(both));
+    // It is found as well, not only kept.
+    CHECK(flip_to_smooth(half, {.weights = {.mark = 2.0}, .marks = marks}) == 1);
+    CHECK(still_there(half));
+}
+
 TEST_CASE("smoothing flips lower what they minimise, and hardly find more the second time") {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
         INFO("seed " << seed);
@@ -126,6 +153,22 @@ TEST_CASE("smoothing flips lower what they minimise, and hardly find more the se
         REQUIRE(crease_sum(mesh) <= mended + 1e-9);
         REQUIRE(mesh.validate().empty());
     }
+}
+
+TEST_CASE("threads do not change what is flipped") {
+    std::vector<std::vector<common::Triangle>> results;
+    for (const unsigned threads : {1U, 3U}) {
+        SurfaceMesh mesh = *SurfaceMesh::from(tests::torus(1.0, 0.4, 30, 40));
+        common::Random random(4);
+        for (int n = 0; n < 500; ++n) {
+            const auto h = static_cast<HalfedgeId>(random.below(3 * mesh.face_slots()));
+            if (mesh.can_flip(h)) mesh.flip(h);
+        }
+        REQUIRE(flip_to_smooth(mesh, {.threads = threads}) > 100);
+        flip_all_to_delaunay(mesh, threads);
+        results.push_back(mesh.extract().triangles);
+    }
+    REQUIRE(results[0] == results[1]);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // tests/receiver/reconstruction_test.cpp
 #include "receiver/reconstruction.hpp"
 
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -170,6 +171,26 @@ TEST_CASE("every vertex says whether it was received, guessed or coarse") {
     CHECK(result->summary.largest_gap.has_value() == (loss > 0.0));
 }
 
+TEST_CASE("where no vertex came, ellipsoids say what the surface is") {
+    const common::TriangleMesh original = tests::torus(1, 0.4, 60, 30);
+    const sender::BroadcastObject object = object_of(original);
+    ReceivedObject part = received(object, 0, 1, 1);
+    for (std::uint32_t i = 0; i < object.vertices.size(); ++i) {
+        const auto& [x, y, z] = object.vertices[i].position;
+        const Vector3d p = Vector3d(object.description.origin[0], object.description.origin[1],
+                                    object.description.origin[2]) +
+                           Vector3d(x, y, z);
+        if (std::abs(std::atan2(p.y(), p.x())) < 0.5) continue;  // a sixth of the ring
+        part.vertex_index.push_back(i);
+        part.vertices.push_back(object.vertices[i]);
+    }
+    const std::optional<Reconstruction> result = reconstruct(part);
+    REQUIRE(result);
+    REQUIRE(result->topology_as_promised);
+    require_positions_kept(part, *result);
+    CHECK(common::measure_distance(result->mesh, original).rms() < 2e-3);
+}
+
 TEST_CASE("with nothing missing, concealment changes no bit") {
     const sender::BroadcastObject object = object_of(tests::torus(1, 0.4, 40, 20));
     const ReceivedObject all = received(object, 0.2, 0, 1);
@@ -225,6 +246,118 @@ TEST_CASE("a broken promise is reported, an approximate one is not judged") {
     const std::optional<Reconstruction> unjudged = reconstruct(part);
     REQUIRE(unjudged);
     REQUIRE_FALSE(unjudged->judged);
+}
+
+TEST_CASE("edges that the sender names are there, and no others suffer for it") {
+    // Its lids are closed by long triangles that no criterion of shape would choose.
+    common::TriangleMesh mesh = tests::box({1.0, 1.0, 2.0}, 12);
+    for (Vector3d& p : mesh.positions) p.z() += 0.15 * std::cos(5 * p.x()) * std::cos(5 * p.y());
+    const sender::BroadcastObject object = object_of(mesh);
+    REQUIRE(object.edges.size() > 5);
+    const double vertex_loss = GENERATE(0.0, 0.3);
+    ReceivedObject without = received(object, 0.0, vertex_loss, 1);
+    ReceivedObject with = without;
+    with.edges = object.edges;
+    std::sort(with.edges.begin(), with.edges.end());
+    const Reconstruction result = reconstruct(with, {}).value();
+    CHECK(result.topology_as_promised);
+    require_positions_kept(with, result);
+    std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
+    for (const common::Triangle& t : result.mesh.triangles) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            edges.emplace(result.vertex_index[t[c]], result.vertex_index[t[(c + 1) % 3]]);
+        }
+    }
+    std::size_t usable = 0;
+    std::size_t there = 0;
+    for (const protocol::EdgeRecord& edge : with.edges) {
+        const auto& known = with.vertex_index;
+        if (known.back() >= edge.among) continue;
+        if (!std::binary_search(known.begin(), known.end(), edge.a)) continue;
+        if (!std::binary_search(known.begin(), known.end(), edge.b)) continue;
+        ++usable;
+        there += edges.contains({edge.a, edge.b}) ? 1 : 0;
+    }
+    REQUIRE(usable > 0);
+    if (vertex_loss == 0.0) CHECK(10 * there >= 9 * usable);  // concealment splits edges
+    const auto rms = [&](const Reconstruction& r) {
+        return common::measure_distance(r.mesh, mesh, {.samples = 20'000}).rms();
+    };
+    if (vertex_loss == 0.0) CHECK(rms(result) <= rms(reconstruct(without, {}).value()));
+}
+
+TEST_CASE("an edge among the first vertices says nothing to whoever has later ones") {
+    const sender::BroadcastObject object = object_of(tests::torus(3, 1, 40, 20));
+    const std::uint32_t half = object.hint.vertices / 2;
+    ReceivedObject whole = received(object, 0.0, 0.0, 1);
+    ReceivedObject prefix = whole;
+    prefix.vertex_index.resize(half);
+    prefix.vertices.resize(half);
+    // Edges that are not there: between vertices two edges apart in what the prefix gives.
+    const Reconstruction plain = reconstruct(prefix, {.grid = 24, .conceal = false}).value();
+    const auto is_edge = [](const Reconstruction& mesh, std::uint32_t a, std::uint32_t b) {
+        return std::any_of(mesh.mesh.triangles.begin(), mesh.mesh.triangles.end(),
+                           [&](const common::Triangle& t) {
+                               int ends = 0;
+                               for (const std::uint32_t v : t) {
+                                   const std::uint32_t index = mesh.vertex_index[v];
+                                   ends += index == a || index == b ? 1 : 0;
+                               }
+                               return ends == 2;
+                           });
+    };
+    std::vector<protocol::EdgeRecord> edges;
+    const auto& triangles = plain.mesh.triangles;
+    for (std::size_t i = 0; i < triangles.size() && edges.size() < 12; i += 40) {
+        for (const common::Triangle& t : triangles) {
+            // A neighbour across an edge of triangle i: its far corner and that of i.
+            const auto shared = [&](std::uint32_t v) {
+                return std::find(t.begin(), t.end(), v) != t.end();
+            };
+            const common::Triangle& s = triangles[i];
+            if (std::count_if(s.begin(), s.end(), shared) != 2) continue;
+            const auto far = std::find_if_not(s.begin(), s.end(), shared);
+            const auto other = std::find_if(t.begin(), t.end(), [&](std::uint32_t v) {
+                return std::find(s.begin(), s.end(), v) == s.end();
+            });
+            const auto [a, b] = std::minmax({plain.vertex_index[*far], plain.vertex_index[*other]});
+            if (b == kNotReceived || is_edge(plain, a, b)) continue;
+            edges.push_back({half, a, b});
+            break;
+        }
+    }
+    REQUIRE(edges.size() >= 8);
+    std::sort(edges.begin(), edges.end());
+    prefix.edges = edges;
+    const Reconstruction followed = reconstruct(prefix, {.grid = 24, .conceal = false}).value();
+    const auto there = std::count_if(edges.begin(), edges.end(), [&](const auto& edge) {
+        return is_edge(followed, edge.a, edge.b);
+    });
+    CHECK(there >= static_cast<std::ptrdiff_t>(edges.size() - 2));  // a fold may hide one
+
+    const Reconstruction untold = reconstruct(whole, {}).value();
+    whole.edges = edges;
+    CHECK(reconstruct(whole, {}).value().mesh.triangles == untold.mesh.triangles);
+}
+
+TEST_CASE("whatever edges are named, the surface stays a closed manifold as promised") {
+    const sender::BroadcastObject object = object_of(tests::torus(3, 1, 40, 20));
+    ReceivedObject lied_to = received(object, 0.0, 0.2, 1);
+    common::Random random(4);
+    for (int k = 0; k < 300; ++k) {
+        protocol::EdgeRecord edge;
+        edge.among = object.hint.vertices;
+        edge.b = 1 + static_cast<std::uint32_t>(random.below(edge.among - 1));
+        edge.a = static_cast<std::uint32_t>(random.below(edge.b));
+        lied_to.edges.push_back(edge);
+    }
+    std::sort(lied_to.edges.begin(), lied_to.edges.end());
+    const Reconstruction result = reconstruct(lied_to, {}).value();
+    CHECK(result.topology.closed);
+    CHECK(result.topology.manifold);
+    CHECK(result.topology_as_promised);
+    require_positions_kept(lied_to, result);
+    CHECK(reconstruct(lied_to, {.threads = 1}).value().mesh.triangles == result.mesh.triangles);
 }
 
 TEST_CASE("records that lie about the shape still give a closed manifold") {

@@ -44,7 +44,7 @@ void offer_all(RecordStore& store, const std::vector<Datagram>& datagrams, Time 
 bool same(const ReceivedObject& a, const ReceivedObject& b) {
     return a.id == b.id && a.hint == b.hint && a.description == b.description &&
            a.ellipsoid_index == b.ellipsoid_index && a.ellipsoids == b.ellipsoids &&
-           a.vertex_index == b.vertex_index && a.vertices == b.vertices;
+           a.vertex_index == b.vertex_index && a.vertices == b.vertices && a.edges == b.edges;
 }
 
 std::vector<protocol::VertexRecord> vertex_at(float x, float y, float z) {
@@ -74,6 +74,31 @@ TEST_CASE("a whole round gives the object that was sent, and its id holds") {
     CHECK(is_complete(got));
     CHECK(id_matches(got));
     CHECK(store.shown()->complete());
+}
+
+TEST_CASE("edges are kept, united with a restarted sender's, and complete nothing") {
+    const MadeObject sent = made_sphere(300, 4);
+    const auto edges_of = [&](std::uint8_t session, std::vector<protocol::EdgeRecord> edges) {
+        protocol::DatagramWriter writer(made_header(sent, session_of(session)), 1200);
+        writer.add_edges(edges);
+        return writer.finish();
+    };
+    RecordStore store;
+    offer(store, edges_of(1, {{300, 5, 7}, {300, 1, 299}}));
+    offer(store, edges_of(1, {{150, 3, 4}, {150, 3, 5}}));
+    offer(store, edges_of(1, {{300, 5, 7}}));
+    CHECK_FALSE(store.shown()->complete());
+    CHECK(store.shown()->records() == 0);
+    const std::vector<protocol::EdgeRecord> first{
+        {150, 3, 4}, {150, 3, 5}, {300, 1, 299}, {300, 5, 7}};
+    CHECK(store.snapshot()->edges == first);
+    const std::size_t bytes = store.bytes();
+    CHECK(bytes > 0);
+    offer(store, edges_of(2, {{300, 0, 1}}), 6s);
+    REQUIRE(store.groups().size() == 1);
+    CHECK(store.snapshot()->edges.size() == 5);
+    CHECK(store.snapshot()->edges.front() == first.front());
+    CHECK(store.bytes() > bytes);
 }
 
 TEST_CASE("a complete object whose records are not those of its id is seen through") {
@@ -405,4 +430,56 @@ TEST_CASE("an object beyond the limit of vertices is not taken in") {
     CHECK_FALSE(offer(store, made_datagrams(sent)[0]));
     CHECK(store.shown() == nullptr);
     CHECK(store.counts().over_limit == 1);
+}
+
+TEST_CASE("a verified key is one sender, wherever it sends from and whenever it started") {
+    const MadeObject sent = made_sphere(900, 20);
+    const auto first = made_datagrams(sent, session_of(1));
+    const auto second = made_datagrams(sent, session_of(2));
+    Source verified = source_at(1);
+    verified.authenticity.key = {7};
+    verified.authenticity.is_signed = true;
+    Source elsewhere = source_at(2, 5000);
+    elsewhere.authenticity = verified.authenticity;
+
+    RecordStore store;
+    offer_all(store, {first.begin(), first.end() - 3}, 0s, verified);
+    CHECK_FALSE(store.shown()->complete());
+    offer_all(store, {second.end() - 3, second.end()}, 1ms, elsewhere);
+    REQUIRE(store.groups().size() == 1);
+    CHECK(store.shown()->complete());
+    CHECK(store.shown()->sender.session == session_of(2).session);
+    CHECK(store.shown()->senders.size() == 2);
+    CHECK(store.shown()->progress.stream_end() == 1ms);  // of the later run
+    CHECK(id_matches(store.snapshot().value()));
+}
+
+TEST_CASE("what a key did not sign, or another key did, never joins what it signed") {
+    const MadeObject sent = made_sphere(900, 20);
+    const auto datagrams = made_datagrams(sent);
+    Source verified = source_at(1);
+    verified.authenticity.key = {7};
+    verified.authenticity.is_signed = true;
+    Source other_key = verified;
+    other_key.authenticity.key = {8};
+    Source claims = source_at(1);
+    claims.authenticity.is_signed = true;
+    Source clear = source_at(1);
+
+    RecordStore store;
+    Time now = 0s;
+    for (const Source& source : {verified, other_key, claims, clear}) {
+        offer(store, datagrams[0], now, source);
+        now += 10s;  // longer than any silence that unites
+    }
+    store.merge_silent(now);
+    REQUIRE(store.groups().size() == 3);
+    CHECK(store.groups()[0].sender.source == verified);
+    CHECK(store.groups()[1].sender.source == other_key);
+    CHECK_FALSE(store.groups()[2].sender.source.authenticity.verified());
+    CHECK(same_station({verified, {1}}, {verified, {2}}));
+    CHECK_FALSE(same_station({verified, {}}, {other_key, {}}));
+    CHECK_FALSE(same_station({verified, {}}, {clear, {}}));
+    CHECK(same_station({source_at(1, 5), {1}}, {source_at(1, 6), {2}}));
+    CHECK_FALSE(same_station({source_at(1), {}}, {source_at(2), {}}));
 }

@@ -65,17 +65,27 @@ struct Run {
 TEST_CASE("the report has the documented keys") {
     const Run run;
     const auto report = make_report(run.content);
-    CHECK(keys(report) == Names{"program", "version", "ends_by", "output", "object", "hint",
-                                "record_format", "datagrams", "ellipsoids", "vertices", "records",
-                                "others", "mesh", "confidence", "not_inserted", "quality",
-                                "seconds"});
+    CHECK(keys(report) == Names{"program",      "version",      "ends_by",       "output",
+                                "object",       "hint",         "record_format", "datagrams",
+                                "authenticity", "ellipsoids",   "vertices",      "edges",
+                                "records",      "others",       "live",          "mesh",
+                                "confidence",   "not_inserted", "quality",       "seconds",
+                                "pages"});
+    CHECK(report["live"].is_null());
     CHECK(keys(report["object"]) == Names{"id", "name", "unit", "complete", "id_verified"});
     CHECK(keys(report["record_format"]) == Names{"normal_bits", "ring", "colour"});
-    CHECK(keys(report["datagrams"]) == Names{"received", "lost", "duplicate", "reordered",
-                                             "malformed", "kernel_dropped", "bytes",
-                                             "lost_in_network", "jitter_ms", "malformed_by"});
+    CHECK(keys(report["datagrams"]) ==
+          Names{"received", "lost", "duplicate", "reordered", "malformed", "kernel_dropped",
+                "bytes", "lost_in_network", "jitter_ms", "loss_rate", "recent", "reorder", "runs",
+                "bursts", "gaps", "malformed_by", "refused", "refused_by", "unverified_dropped"});
+    CHECK(keys(report["datagrams"]["refused_by"]) ==
+          Names{"other_payload_type", "no_key", "not_sealed", "not_signed", "unknown_key",
+                "bad_tag", "bad_signature", "replayed", "out_of_date"});
+    CHECK(keys(report["authenticity"]) == Names{"signed", "sealed", "verified_by"});
+    CHECK(report["authenticity"]["verified_by"].is_null());
     CHECK(keys(report["ellipsoids"]) == Names{"received", "expected"});
     CHECK(keys(report["vertices"]) == Names{"received", "expected", "in_mesh"});
+    CHECK(keys(report["edges"]) == Names{"received"});
     CHECK(keys(report["mesh"]) == Names{"vertices", "faces", "components", "genus", "closed",
                                         "manifold", "topology_as_promised", "judged", "isolevel"});
     CHECK(keys(report["confidence"]) ==
@@ -168,4 +178,26 @@ TEST_CASE("the summary for people names loss, topology and distance") {
     CHECK(summary_text(run.content).find("missing") == std::string::npos);
     run.reconstruction.judged = false;
     CHECK(summary_text(run.content).find("not judged") != std::string::npos);
+}
+
+TEST_CASE("the report says when the first live mesh was there, and what the last one held") {
+    ReportContent content;
+    content.live.emplace();
+    nlohmann::ordered_json live = make_report(content)["live"];
+    CHECK(keys(live) == Names{"updates", "first_shape_ms", "last"});
+    CHECK(live["updates"] == 0);
+    CHECK(live["first_shape_ms"].is_null());
+    CHECK(live["last"].is_null());
+
+    content.live->updates = 2;
+    content.live->first_shape = std::chrono::milliseconds(30);
+    content.live->last_shape = std::chrono::milliseconds(600);
+    content.live->last_vertices = 7;
+    content.live->last_records = 9;
+    live = make_report(content)["live"];
+    CHECK(live["updates"] == 2);
+    CHECK(live["first_shape_ms"] == 30.0);
+    CHECK(live["last"]["ms"] == 600.0);
+    CHECK(live["last"]["vertices"] == 7);
+    CHECK(live["last"]["records"] == 9);
 }

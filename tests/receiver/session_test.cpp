@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/random.hpp"
+#include "sender/datagram_security.hpp"
 #include "tests/support/datagrams.hpp"
 
 using namespace ellicast;
@@ -323,6 +324,52 @@ TEST_CASE("a restarted sender goes on where the first one fell silent") {
     }
 }
 
+TEST_CASE("two hosts that drew the same SSRC are two streams, datagram by datagram") {
+    MadeStream ours = stream_of(1);
+    MadeStream theirs = stream_of(1, 2);
+    theirs.ssrc = ours.ssrc;
+    theirs.first_sequence = static_cast<std::uint16_t>(ours.first_sequence + 20'000);
+    const auto one = without(made_datagrams(object(), ours), 5);
+    const auto two = made_datagrams(made_sphere(300, 3, 9), theirs);
+    Run run;
+    for (std::size_t k = 0; k < one.size(); ++k) {
+        run.receive(one[k], source_at(1));
+        if (k < two.size()) run.receive(two[k], source_at(2));
+    }
+    run.pass(5s);
+    const SessionSummary summary = run.session.summary(run.now);
+    CHECK(summary.datagrams.received == one.size());
+    CHECK(summary.datagrams.lost == 1);
+    CHECK(summary.datagrams.reordered == 0);
+    CHECK(summary.datagrams.duplicate == 0);
+    CHECK(summary.other_datagrams == two.size());
+    CHECK(run.session.store().shown()->object == object().id);
+}
+
+TEST_CASE("a sender that starts anew has lost nothing, whatever its SSRC and numbers do") {
+    MadeStream before = stream_of(0, 1);
+    MadeStream after = stream_of(0, 2);
+    before.ssrc = 7;
+    after.ssrc = GENERATE(7u, 8u);
+    // The next number; the same ones again; a jump back, and one of half the numbers.
+    const int jump = GENERATE(-40, 0, -1000, 32'768);
+    const auto first = made_datagrams(object(), before);
+    const std::size_t half = first.size() / 2;
+    after.first_sequence =
+        static_cast<std::uint16_t>(before.first_sequence + half + static_cast<unsigned>(jump));
+    const auto second = made_datagrams(object(), after);
+    Run run(until(Until::forever));
+    run.receive(slice(first, 0, half));
+    run.pass(6s);
+    run.receive(without(second, 3));
+    const SessionSummary summary = run.session.summary(run.now);
+    CHECK(summary.datagrams.received == half + second.size() - 1);
+    CHECK(summary.datagrams.lost == 1);
+    CHECK(summary.datagrams.duplicate == 0);
+    CHECK(summary.datagrams.reordered == 0);
+    CHECK(is_complete(*run.session.store().snapshot()));
+}
+
 TEST_CASE("another host's traffic neither keeps reception going nor joins the object") {
     const auto datagrams = made_datagrams(object());
     const auto strange = made_datagrams(made_sphere(100, 3, 9), stream_of(0, 7), 100);
@@ -443,5 +490,138 @@ TEST_CASE("simulated corruption is counted as malformed and enters nothing") {
     const ReceivedObject got = *run.session.store().snapshot();
     for (std::size_t k = 0; k < got.vertices.size(); ++k) {
         REQUIRE(got.vertices[k] == object().vertices[got.vertex_index[k]]);
+    }
+}
+
+namespace {
+
+std::vector<Datagram> signed_datagrams(std::uint64_t start_us = 1) {
+    sender::StreamKeys keys;
+    keys.sign = common::SigningKey::of_seed({3});
+    sender::DatagramSecurity security(keys, stream_of(1).session, start_us);
+    std::vector<Datagram> datagrams;
+    for (const Datagram& clear : made_datagrams(object(), stream_of(1))) {
+        datagrams.push_back(security.secure(clear, 0));
+    }
+    return datagrams;
+}
+
+SessionOptions verifying() {
+    SessionOptions options;
+    options.gate.verify = {common::SigningKey::of_seed({3}).public_key()};
+    return options;
+}
+
+}  // namespace
+
+TEST_CASE("signed datagrams count once they are verified, which is due at once") {
+    Run run(verifying());
+    for (const Datagram& datagram : signed_datagrams()) {
+        run.session.on_datagram(run.now, source_at(1), datagram);
+    }
+    CHECK(run.records() == 0);
+    CHECK(run.session.next_wakeup() == run.now);
+    run.pass(1ms);
+    CHECK(run.session.ends_by() == EndReason::complete);
+    CHECK(id_matches(*run.session.store().snapshot()));
+    const SessionSummary summary = run.session.summary(run.now);
+    CHECK(summary.authenticity.verified());
+    CHECK(summary.datagrams.lost == 0);
+    std::uint64_t bytes = 0;
+    for (const Datagram& datagram : signed_datagrams()) bytes += datagram.size();
+    CHECK(summary.datagrams.bytes == bytes);  // as they came, not as they were let in
+}
+
+TEST_CASE("a wish to end waits for what has arrived") {
+    Run run(verifying());
+    for (const Datagram& datagram : signed_datagrams()) {
+        run.session.on_datagram(run.now, source_at(1), datagram);
+    }
+    run.session.interrupt(run.now);
+    CHECK(run.session.ends_by() == EndReason::complete);
+}
+
+TEST_CASE("forgers with the right session id are refused and do not keep a session awake") {
+    Run run(verifying());
+    run.receive(slice(signed_datagrams(), 0, 5));
+    const std::size_t records = run.records();
+    CHECK(records > 0);
+    auto forged = signed_datagrams();
+    for (Datagram& datagram : forged) datagram[datagram.size() - 200] ^= 1;
+    run.receive(forged);
+    run.receive(made_datagrams(object(), stream_of(1)));
+    CHECK(run.records() == records);
+    CHECK(run.session.store().groups().size() == 1);
+    const SessionSummary summary = run.session.summary(run.now);
+    CHECK(summary.refused[static_cast<std::size_t>(Refusal::bad_signature)] == forged.size());
+    CHECK(summary.refused[static_cast<std::size_t>(Refusal::not_signed)] == forged.size());
+    CHECK(summary.malformed.total() == 0);
+    for (int k = 0; k < 30 && !run.session.finished(); ++k) {
+        run.receive(forged[0]);
+        run.pass(100ms);
+    }
+    CHECK(run.session.ends_by() == EndReason::idle);
+}
+
+TEST_CASE("loss is simulated on what the gate lets in, sections of signed datagrams included") {
+    SessionOptions options = verifying();
+    options.loss.drop_vertices = 1.0;
+    Run run(options);
+    run.receive(signed_datagrams());
+    REQUIRE(run.session.store().shown());
+    CHECK(run.session.store().shown()->vertices.size() == 0);
+    CHECK(run.session.store().shown()->ellipsoids.size() > 0);
+}
+
+TEST_CASE("a clock that is set by hours, either way, neither ends reception nor holds it up") {
+    constexpr std::chrono::microseconds kStart = 1'700'000'000s;
+    const auto step = GENERATE(-9000h, -3h, 3h, 9000h);
+    const auto datagrams = signed_datagrams(static_cast<std::uint64_t>(kStart.count()));
+    const std::size_t third = datagrams.size() / 3;
+    SessionOptions options = verifying();
+    const auto clock = [&](Run& run, std::chrono::microseconds ahead) {
+        run.session.set_clock(run.now, kStart + ahead);
+    };
+    SECTION("nobody asked for an age") {
+        Run run(options);
+        clock(run, 0s);
+        run.receive(slice(datagrams, 0, third));
+        clock(run, step);
+        run.receive(slice(datagrams, third, datagrams.size()));
+        CHECK(run.session.ends_by() == EndReason::complete);
+    }
+    options.gate.max_age = 10s;
+    SECTION("an age is asked for: taken again as soon as the clock is right again") {
+        Run run(options);
+        clock(run, 0s);
+        run.receive(slice(datagrams, 0, third));
+        const std::size_t records = run.records();
+        REQUIRE(records > 0);
+        clock(run, step);
+        run.receive(slice(datagrams, third, 2 * third));
+        CHECK(run.records() == records);
+        CHECK_FALSE(run.session.finished());
+        clock(run, 0s);
+        run.receive(slice(datagrams, 2 * third, datagrams.size()));
+        CHECK(run.records() > records);
+        run.receive(slice(datagrams, third, 2 * third));  // in the next round, say
+        CHECK(run.session.ends_by() == EndReason::complete);
+        CHECK(id_matches(*run.session.store().snapshot()));
+    }
+    SECTION("an age is asked for, and the clock stays wrong: what was received is kept") {
+        Run run(options);
+        clock(run, 0s);
+        run.receive(slice(datagrams, 0, third));
+        const std::size_t records = run.records();
+        clock(run, step);
+        for (int k = 0; k < 30 && !run.session.finished(); ++k) {
+            run.receive(datagrams[third]);
+            run.pass(100ms);
+        }
+        CHECK(run.session.ends_by() == EndReason::idle);
+        CHECK(run.records() == records);
+        CHECK(
+            run.session.summary(run.now).refused[static_cast<std::size_t>(Refusal::out_of_date)] >=
+            10);
     }
 }

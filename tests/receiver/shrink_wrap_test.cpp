@@ -61,5 +61,15 @@ TEST_CASE("no points change nothing, threads change nothing") {
     REQUIRE(mesh.positions == other.positions);
 }
 
+TEST_CASE("points beyond eight a vertex are not asked") {
+    common::TriangleMesh mesh = tests::icosphere(2, 0.97);
+    common::TriangleMesh other = mesh;
+    std::vector<Vector3d> points = sphere_points(8 * mesh.positions.size(), false);
+    shrink_wrap(mesh, points, 3, 1);
+    points.emplace_back(0, 0, 5);
+    shrink_wrap(other, points, 3, 1);
+    REQUIRE(mesh.positions == other.positions);
+}
+
 }  // namespace
 }  // namespace ellicast::receiver

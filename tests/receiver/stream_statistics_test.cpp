@@ -46,7 +46,29 @@ struct Oracle {
             ++counts.duplicate;
         } else if (late) {
             ++counts.reordered;
+            counts.reorder_sum += *seen.rbegin() - n;
+            counts.reorder_farthest = std::max(counts.reorder_farthest, *seen.rbegin() - n);
         }
+    }
+    /// How the losses lie between the first and the last seen.
+    [[nodiscard]] LossPattern pattern() const {
+        LossRuns runs;
+        for (std::uint64_t n = *seen.begin(); n <= *seen.rbegin(); ++n) {
+            if (seen.count(n) > 0) {
+                runs.add_received();
+            } else {
+                runs.add_lost();
+            }
+        }
+        return runs.pattern();
+    }
+    [[nodiscard]] std::uint64_t recent_lost() const {
+        std::uint64_t lost = 0;
+        const std::uint64_t end = *seen.rbegin() + 1;
+        const std::uint64_t begin =
+            std::max(*seen.begin(), end - std::min<std::uint64_t>(end, 1024));
+        for (std::uint64_t n = begin; n < end; ++n) lost += seen.count(n) == 0;
+        return lost;
     }
 };
 
@@ -77,6 +99,17 @@ TEST_CASE("counts equal a brute-force oracle's through loss, copies, reordering 
     for (const std::uint64_t n : order) {
         statistics.on_datagram(sent_at(n), nth(n, per_round, rounds), 100);
         oracle.on(n, 100);
+    }
+    {
+        const StreamCounts so_far = statistics.counts(false);
+        CHECK(so_far.reorder_sum == oracle.counts.reorder_sum);
+        CHECK(so_far.reorder_farthest == oracle.counts.reorder_farthest);
+        CHECK(so_far.recent_lost == oracle.recent_lost());
+        if (so_far.reorder_farthest < StreamStatistics::kSettling) {
+            CHECK(so_far.pattern == oracle.pattern());
+        } else {
+            CHECK(so_far.pattern.lost() >= oracle.pattern().lost());
+        }
     }
     const std::uint64_t tail =
         *oracle.seen.rbegin() / per_round + 1 == rounds ? announced - 1 - *oracle.seen.rbegin() : 0;
@@ -229,4 +262,62 @@ TEST_CASE("malformed datagrams are counted by cause") {
     CHECK(counts.total() == 3);
     CHECK(counts.of(protocol::WireError::bad_checksum) == 2);
     CHECK(counts.of(protocol::WireError::bad_hint) == 0);
+}
+
+TEST_CASE("a blackout longer than the window is one run") {
+    StreamStatistics statistics(0s);
+    constexpr std::uint64_t kBlackout = 100'000;  // over a wrap-around; the rounds tell how long
+    std::uint64_t n = 0;
+    for (; n < 2000; ++n) statistics.on_datagram(sent_at(n), nth(n, 500), 100);
+    n += kBlackout;
+    for (std::uint64_t k = 0; k < 2000; ++k, ++n) {
+        statistics.on_datagram(sent_at(n), nth(n, 500), 100);
+    }
+    const StreamCounts counts = statistics.counts(false);
+    CHECK(counts.lost == kBlackout);
+    CHECK(counts.pattern.runs == 1);
+    CHECK(counts.pattern.longest_run == kBlackout);
+    CHECK(counts.pattern.bursts == 1);
+    CHECK(counts.pattern.burst_density() == 1.0);
+    CHECK(counts.pattern.gaps == 2);
+    CHECK(counts.recent_lost == 0);
+    CHECK(counts.recent_expected == StreamStatistics::kRecent);
+    CHECK(counts.datagram_ms == Approx(1.0));
+}
+
+TEST_CASE("who comes later than the settling time is lost to the pattern alone") {
+    StreamStatistics statistics(0s);
+    for (std::uint64_t n = 0; n < 3000; ++n) {
+        if (n != 1000) statistics.on_datagram(sent_at(n), nth(n, 500), 100);
+    }
+    statistics.on_datagram(sent_at(3000), nth(1000, 500), 100);
+    const StreamCounts counts = statistics.counts(false);
+    CHECK(counts.lost == 0);
+    CHECK(counts.reorder_farthest == 1999);
+    CHECK(counts.pattern.lost() == 1);
+}
+
+TEST_CASE("two sources with one SSRC, and one that starts again, are streams of their own") {
+    StreamTable table(0s);
+    SenderKey one;
+    one.source.address[15] = 1;
+    SenderKey two = one;
+    two.source.address[15] = 2;
+    SenderKey again = one;
+    again.session[0] = 1;
+    for (std::uint64_t n = 0; n < 1000; ++n) {
+        table.on_datagram(sent_at(n), one, nth(n, 500), 100);
+        table.on_datagram(sent_at(n), two, nth(n, 500, 0, 20'000), 100);  // the same SSRC
+    }
+    for (std::uint64_t n = 0; n < 500; ++n) {
+        if (n % 10 == 5) continue;
+        table.on_datagram(sent_at(2000 + n), again, nth(n, 500, 0, 7), 100);
+    }
+    CHECK(table.counts({one}, false).lost == 0);
+    CHECK(table.counts({two}, false).lost == 0);
+    const StreamCounts both = table.counts({one, again}, false);
+    CHECK(both.lost == 50);
+    CHECK(both.pattern.lost() == 50);
+    CHECK(both.pattern.longest_run == 1);
+    CHECK(both.reordered == 0);
 }

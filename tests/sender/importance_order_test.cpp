@@ -10,10 +10,12 @@
 #include "common/mesh_topology.hpp"
 #include "common/random.hpp"
 #include "sender/broadcast_object.hpp"
+#include "sender/range_decimation.hpp"
 #include "sender/spread_order.hpp"
 #include "sender/surface_decimation.hpp"
 #include "sender/vertex_queue.hpp"
 #include "tests/sender/made_objects.hpp"
+#include "tests/support/large_model.hpp"
 #include "tests/support/meshes.hpp"
 
 namespace ellicast::sender {
@@ -55,6 +57,7 @@ std::vector<std::uint32_t> importance_of(const TriangleMesh& surface) {
     std::vector<std::uint32_t> ranking = removal_order(surface);
     std::reverse(ranking.begin(), ranking.end());
     std::vector<Vector3d> positions;
+    positions.reserve(ranking.size());
     for (const std::uint32_t index : ranking) positions.push_back(surface.positions[index]);
     std::vector<std::uint32_t> order;
     for (const std::uint32_t k : spread_within_strata(positions, 1)) order.push_back(ranking[k]);
@@ -142,6 +145,43 @@ TEST_CASE("a prefix in order of importance is nearer to the model than one in sp
         CAPTURE(share, ours, theirs);
         CHECK(ours < 0.75 * theirs);
     }
+}
+
+TEST_CASE("a large surface is decimated in ranges, alike on any number of threads") {
+    const TriangleMesh surface = tests::large_model(plate_with_bump(), 140'000, 1);
+    const std::vector<std::uint32_t> removed = removal_order(surface, 1);
+    REQUIRE(is_permutation_of(removed, surface.positions.size()));
+    CHECK((removal_order(surface, 3) == removed));
+    const std::vector<std::uint32_t> importance(removed.rbegin(), removed.rend());
+    const std::vector<std::uint32_t> spread = spread_order(surface.positions, 1);
+    for (const double share : {0.1, 0.5}) {
+        const double ours = prefix_error(surface, importance, share);
+        const double theirs = prefix_error(surface, spread, share);
+        CAPTURE(share, ours, theirs);
+        CHECK(ours < 0.5 * theirs);
+    }
+}
+
+TEST_CASE("a range is decimated alone, but for its border") {
+    const TriangleMesh torus = tests::torus(1.0, 0.3, 60, 24);
+    const DecimatedMesh before(torus);
+    DecimatedMesh mesh(torus);
+    const std::uint32_t begin = 400;
+    const std::uint32_t end = 1000;
+    const auto outside = [&](std::uint32_t v) { return v < begin || v >= end; };
+    std::vector<Removal> removals;
+    RangeDecimation(mesh, begin, end).remove(Allowed::good_shape, 0, removals);
+    CHECK(removals.size() > 200);
+    for (const Removal& removal : removals) REQUIRE(!outside(removal.vertex));
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const common::Triangle& corners = before.triangles[t];
+        if (!std::any_of(corners.begin(), corners.end(), outside)) continue;
+        REQUIRE(mesh.triangles[t] == corners);
+        for (const std::uint32_t v : corners) REQUIRE(mesh.removed[v] == 0);
+    }
+    removals.clear();
+    RangeDecimation(mesh, 0, 400).remove(Allowed::good_shape, 300, removals);
+    CHECK(removals.size() == 100);
 }
 
 TEST_CASE("collapsing onto some vertices keeps them, their places and the topology") {

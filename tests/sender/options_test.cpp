@@ -180,6 +180,8 @@ TEST_CASE("tags are a number of bits, with or without a ring") {
 
 TEST_CASE("decomposing needs no destination") {
     CHECK(accepted({"a.ply", "--decompose-only", "f"}).decompose_only == "f");
+    CHECK(accepted({"a.ply", "--to", "h", "--sdp", "s"}).sdp == "s");
+    CHECK_FALSE(accepted({"a.ply", "--to", "h"}).sdp.has_value());
 }
 
 TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the flag") {
@@ -229,6 +231,7 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
         std::vector<const char*>{"a.ply", "--to", "h", "--log-level", "loud"},
         std::vector<const char*>{"a.ply", "--to", "h", "--config", "/no/such/file"},
         std::vector<const char*>{"a.ply", "--to", "h", "--frobnicate"},
+        std::vector<const char*>{"a.ply", "--decompose-only", "f", "--sdp", "s"},
         std::vector<const char*>{"a.ply", "b.ply", "--decompose-only", "f"});
     std::string line;
     for (const char* argument : arguments) line += std::string(argument) + " ";
@@ -274,6 +277,7 @@ TEST_CASE("help shows every flag with examples, version the version; both end wi
                              "--tags",
                              "--colour",
                              "--report",
+                             "--sdp",
                              "--log-level",
                              "--quiet",
                              "--config",

@@ -24,6 +24,7 @@ struct ReadDatagram {
     std::vector<std::uint32_t> ellipsoids;
     std::vector<std::uint32_t> vertices;
     std::vector<std::uint32_t> strides;  // of the sections of vertices
+    std::vector<protocol::EdgeRecord> edges;
     std::optional<protocol::Description> description;
 };
 
@@ -38,6 +39,12 @@ ReadDatagram read(const RoundPlan& plan, std::uint32_t round, std::uint32_t ordi
     for (const protocol::SectionView& section : view->sections()) {
         if (section.kind == protocol::SectionKind::description) {
             datagram.description = section.description();
+            continue;
+        }
+        if (section.kind == protocol::SectionKind::edges) {
+            for (std::size_t k = 0; k < section.count; ++k) {
+                datagram.edges.push_back(section.edge(k));
+            }
             continue;
         }
         const bool ellipsoids = section.kind == protocol::SectionKind::ellipsoids;
@@ -66,6 +73,7 @@ void check_round(const RoundPlan& plan, const PlanOptions& options, std::uint32_
     const std::vector<ReadDatagram> datagrams = read_round(plan, round);
     std::vector<std::size_t> ellipsoids(plan.object().ellipsoids.size(), 0);
     std::vector<std::size_t> vertices(plan.object().vertices.size(), 0);
+    std::map<protocol::EdgeRecord, std::size_t> edges;
     std::size_t without_description = 0;
     std::size_t without_ellipsoids = 0;
     for (std::uint32_t k = 0; k < datagrams.size(); ++k) {
@@ -78,7 +86,8 @@ void check_round(const RoundPlan& plan, const PlanOptions& options, std::uint32_
         REQUIRE(datagram.header.object == plan.object().id);
         REQUIRE(datagram.header.hint == plan.object().hint);
         const bool has_records = !datagram.ellipsoids.empty() || !datagram.vertices.empty();
-        REQUIRE((has_records || datagram.description));
+        REQUIRE((has_records || datagram.description || !datagram.edges.empty()));
+        for (const protocol::EdgeRecord& edge : datagram.edges) ++edges[edge];
         for (const std::uint32_t index : datagram.ellipsoids) ++ellipsoids[index];
         for (const std::uint32_t index : datagram.vertices) ++vertices[index];
 
@@ -98,8 +107,26 @@ void check_round(const RoundPlan& plan, const PlanOptions& options, std::uint32_
     } else {
         REQUIRE(std::count(vertices.begin(), vertices.end(), 0u) == 0);
     }
+    REQUIRE(edges.size() == plan.object().edges.size());
+    for (const auto& [edge, count] : edges) REQUIRE(count == 2);
     REQUIRE(plan.copies() >= options.copies);
     if (options.copies == 1) REQUIRE(plan.copies() == 1);
+}
+
+/// The object with so many edges, on three levels.
+BroadcastObject with_edges(BroadcastObject object, std::size_t count, std::uint64_t seed) {
+    common::Random random(seed);
+    const auto vertices = static_cast<std::uint32_t>(object.vertices.size());
+    std::set<protocol::EdgeRecord> edges;
+    while (vertices > 8 && edges.size() < count) {
+        protocol::EdgeRecord edge;
+        edge.among = vertices >> random.below(3);
+        edge.b = 1 + static_cast<std::uint32_t>(random.below(edge.among - 1));
+        edge.a = static_cast<std::uint32_t>(random.below(edge.b));
+        edges.insert(edge);
+    }
+    object.edges.assign(edges.begin(), edges.end());
+    return object;
 }
 
 }  // namespace
@@ -121,6 +148,45 @@ TEST_CASE("every record is in a round exactly as often as promised, whatever the
             vertices);
     const RoundPlan plan(made_object(ellipsoids, vertices, seed), options);
     for (std::uint32_t round = 0; round < 3; ++round) check_round(plan, options, round);
+}
+
+TEST_CASE("every edge is in every round twice, first in the first half of its body") {
+    const std::uint64_t seed = GENERATE(range<std::uint64_t>(1, 31));
+    common::Random random(seed);
+    PlanOptions options;
+    options.rounds = 3;
+    options.datagram_bytes = random.chance(0.3) ? 576 : 576 + random.below(4000);
+    options.copies = 1 + random.below(4);
+    options.redundancy = random.chance(0.3) ? 1.5 : 1.0;
+    const std::size_t vertices = 20 + random.below(20'000);
+    const std::size_t count = 1 + vertices / (20 + random.below(200));
+    CAPTURE(seed, options.datagram_bytes, options.copies, vertices, count);
+    const RoundPlan plan(
+        with_edges(made_object(1 + random.below(500), vertices, seed), count, seed), options);
+    for (std::uint32_t round = 0; round < 3; ++round) check_round(plan, options, round);
+    std::set<protocol::EdgeRecord> early;
+    for (std::uint32_t k = 0; k <= plan.datagrams() / 2 + plan.object().ellipsoids.size() / 10;
+         ++k) {
+        if (k >= plan.datagrams()) break;
+        const ReadDatagram datagram = read(plan, 0, k);
+        early.insert(datagram.edges.begin(), datagram.edges.end());
+    }
+    CHECK(early.size() == plan.object().edges.size());
+}
+
+TEST_CASE("edges find their way beside a description that leaves hardly any room") {
+    BroadcastObject object = with_edges(made_object(50, 400), 40, 1);
+    object.description.name = std::string(255, 'x');
+    object.description.unit = std::string(100, 'y');
+    PlanOptions options;
+    options.datagram_bytes = 576;
+    const RoundPlan plan(object, options);
+    std::size_t edges = 0;
+    for (const ReadDatagram& datagram : read_round(plan, 0)) {
+        CHECK(datagram.bytes <= 576);
+        edges += datagram.edges.size();
+    }
+    CHECK((edges == 2 * object.edges.size() || edges == 0));
 }
 
 TEST_CASE("the smallest and the most lopsided objects make whole rounds") {

@@ -108,6 +108,22 @@ TEST_CASE("rounds follow each other, and the session ends after the last") {
     CHECK(more.empty());
 }
 
+TEST_CASE("datagrams made in the memory of earlier ones are the same") {
+    const auto bytes_of = [](bool recycles) {
+        Session session(one_plan(3000, 2), SessionOptions{});
+        std::vector<Datagram> all;
+        std::vector<Datagram> batch;
+        for (Time now = 0s; !session.done(); now = std::max(now, session.next_wakeup())) {
+            session.poll(now, batch);
+            all.insert(all.end(), batch.begin(), batch.end());
+            if (recycles) session.recycle(batch);
+            batch.clear();
+        }
+        return all;
+    };
+    CHECK(bytes_of(true) == bytes_of(false));
+}
+
 TEST_CASE("a session without end goes on") {
     Session session(one_plan(500, 0), SessionOptions{});
     const std::vector<Sent> all = run(session, 0s, 0s, 2s);
@@ -233,6 +249,151 @@ TEST_CASE("an unpaced session hands out batches until it is done") {
         count += out.size();
     }
     CHECK(count == session.counts().offered);
+}
+
+namespace {
+
+PlanOptions paged(std::uint32_t rounds) {
+    PlanOptions options = plan_options(rounds);
+    options.paged = true;
+    return options;
+}
+
+RoundPlan page_of(std::size_t vertices, std::uint64_t seed, std::uint32_t rounds = 0) {
+    sender::BroadcastObject object = made_object(20, vertices, seed);
+    object.description.name = "page-" + std::to_string(seed);
+    return {std::move(object), paged(rounds)};
+}
+
+/// The pages told in datagrams from `begin` on, in order.
+std::vector<protocol::PageEntry> pages_in(const std::vector<Sent>& all, std::size_t begin = 0) {
+    std::vector<protocol::PageEntry> pages;
+    for (std::size_t k = begin; k < all.size(); ++k) {
+        const auto view = protocol::parse_datagram(all[k].bytes);
+        for (const protocol::SectionView& section : view->sections()) {
+            if (section.kind == protocol::SectionKind::page) pages.push_back(section.page());
+        }
+    }
+    return pages;
+}
+
+}  // namespace
+
+TEST_CASE("the contents of a carousel are told after as many descriptions as it has pages") {
+    std::vector<RoundPlan> plans{page_of(4000, 1), page_of(9000, 2), page_of(500, 3)};
+    std::vector<protocol::ObjectId> ids;
+    ids.reserve(plans.size());
+    for (const RoundPlan& plan : plans) ids.push_back(plan.object().id);
+    Session session(std::move(plans), SessionOptions{});
+    const std::vector<Sent> all = run(session, 0s, 0s, 2s);
+    const std::vector<protocol::PageEntry> pages = pages_in(all);
+    REQUIRE(pages.size() > 10);
+    std::set<std::uint16_t> heard;
+    for (std::size_t k = 0; k < pages.size(); ++k) {
+        const protocol::PageEntry& entry = pages[k];
+        REQUIRE(entry.pages == 3);
+        REQUIRE(entry.version == 1);
+        REQUIRE(entry.object == ids[entry.page]);
+        REQUIRE(entry.name == "page-" + std::to_string(entry.page + 1));
+        REQUIRE(entry.ellipsoids == 20);
+        if (k < 6) heard.insert(entry.page);
+    }
+    CHECK(heard.size() == 3);
+}
+
+TEST_CASE("a session of one page tells no contents until the page changes") {
+    std::vector<RoundPlan> plans = one_plan(3000, 0);
+    Session session(std::move(plans), SessionOptions{});
+    std::vector<Sent> all = run(session, 0s, 0s, 100ms);
+    CHECK(pages_in(all).empty());
+    session.replace(0, page_of(3000, 9));
+    all = run(session, 100ms, 0s, 500ms);
+    const std::vector<protocol::PageEntry> pages = pages_in(all);
+    REQUIRE_FALSE(pages.empty());
+    CHECK(pages.front().pages == 1);
+    CHECK(pages.front().version == 2);
+}
+
+TEST_CASE("a page's new object is on air from its next turn on, laid out as in round 0") {
+    std::vector<RoundPlan> plans{page_of(4000, 1), page_of(4000, 2)};
+    const protocol::ObjectId before = plans[1].object().id;
+    RoundPlan fresh = page_of(4000, 7);
+    const protocol::ObjectId after = fresh.object().id;
+    Session session(std::move(plans), SessionOptions{});
+    // Into the second page's turn of round 1.
+    std::vector<Sent> all;
+    std::vector<Datagram> out;
+    Time now = 0s;
+    const auto go = [&](const auto& until) {
+        while (!until()) {
+            now = std::max(now, session.next_wakeup());
+            out.clear();
+            session.poll(now, out);
+            for (Datagram& datagram : out) all.push_back(sent(now, std::move(datagram)));
+        }
+    };
+    go([&] { return session.round() == 1 && session.page() == 1 && session.ordinal() > 3; });
+    session.replace(1, std::move(fresh));
+    CHECK(session.plans()[1].object().id == before);
+    go([&] { return session.round() == 3 && session.page() == 0; });
+    CHECK(session.versions() == std::vector<std::uint32_t>{1, 2});
+    CHECK(session.first_round(1) == 2);
+    CHECK(session.take_retired().size() == 1);
+
+    std::uint32_t next_vertex = 0;
+    std::set<std::uint32_t> rounds_after;
+    for (const Sent& datagram : all) {
+        const bool old = datagram.header.object == before;
+        if (old) CHECK(datagram.header.round < 2);
+        if (datagram.header.object != after) continue;
+        CHECK(datagram.header.round >= 2);
+        rounds_after.insert(datagram.header.round);
+        const auto view = protocol::parse_datagram(datagram.bytes);
+        for (const protocol::SectionView& section : view->sections()) {
+            if (section.kind != protocol::SectionKind::vertices) continue;
+            CHECK(section.first == next_vertex);
+            next_vertex += section.count;
+        }
+    }
+    CHECK(rounds_after == std::set<std::uint32_t>{2});
+    CHECK(next_vertex == 4000);
+    for (const protocol::PageEntry& entry : pages_in(all)) {
+        if (entry.page == 1) CHECK(entry.version == (entry.object == after ? 2 : 1));
+    }
+}
+
+TEST_CASE("of several new objects that wait for one turn the last is sent") {
+    Session session({page_of(2000, 1), page_of(2000, 2)}, SessionOptions{});
+    run(session, 0s, 0s, 1ms);
+    session.replace(1, page_of(2000, 3));
+    session.replace(1, page_of(2000, 4));
+    const auto expected = page_of(2000, 4).object().id;
+    run(session, 1ms, 0s, 1s);
+    CHECK(session.plans()[1].object().id == expected);
+    CHECK(session.versions()[1] == 2);
+}
+
+TEST_CASE("a session that shall finish ends with its round") {
+    const std::uint32_t rounds = GENERATE(0u, 5u);
+    Session session({page_of(2000, 1, rounds), page_of(3000, 2, rounds)}, SessionOptions{});
+    run(session, 0s, 0s, 5ms);
+    REQUIRE(session.round() == 0);
+    session.finish_round();
+    const std::vector<Sent> rest = run(session, 5ms);
+    CHECK(session.done());
+    CHECK(session.cut_short());
+    CHECK(session.counts().rounds == 1);
+    CHECK(rest.back().header.ordinal + 1 == rest.back().header.datagrams);
+    CHECK(rest.back().header.object == session.plans()[1].object().id);
+}
+
+TEST_CASE("a session asked to finish in its last round leaves out nothing") {
+    Session session(one_plan(2000, 1), SessionOptions{});
+    run(session, 0s, 0s, 2ms);
+    session.finish_round();
+    run(session, 2ms);
+    CHECK(session.done());
+    CHECK_FALSE(session.cut_short());
 }
 
 }  // namespace ellicast::sender

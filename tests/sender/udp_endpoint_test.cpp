@@ -29,7 +29,8 @@ Session made_session(std::uint64_t bits_per_second, std::uint32_t rounds = 1,
 TEST_CASE("what the session hands out arrives, byte for byte and in order, on IPv4 and IPv6") {
     const bool v6 = GENERATE(false, true);
     UdpSink sink(v6);
-    UdpEndpoint endpoint(v6 ? "::1" : "127.0.0.1", sink.port(), 1200);
+    const bool segments = GENERATE(false, true);
+    UdpEndpoint endpoint(v6 ? "::1" : "127.0.0.1", sink.port(), 1200, {.segments = segments});
     CHECK(endpoint.ip_udp_bytes() == (v6 ? 48 : 28));
     CHECK(endpoint.peer() == (v6 ? "[::1]:" : "127.0.0.1:") + std::to_string(sink.port()));
     Session session = made_session(50'000'000);

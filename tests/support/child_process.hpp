@@ -4,7 +4,9 @@
 #include <sys/types.h>
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -33,11 +35,12 @@ class ChildProcess {
     ChildProcess(const ChildProcess&) = delete;
     ChildProcess& operator=(const ChildProcess&) = delete;
 
+    [[nodiscard]] pid_t pid() const { return pid_; }
     void send_signal(int number) const;
 
     /// Exit code, or 128 + signal that ended it. Throws std::runtime_error, and kills it, when it
     /// still runs after `limit`.
-    int wait(std::chrono::seconds limit = std::chrono::seconds(60));
+    int wait(std::chrono::seconds limit = std::chrono::seconds(300));
 
     /// Text so far.
     [[nodiscard]] std::string out() const;
@@ -54,6 +57,15 @@ class ChildProcess {
     bool ended_ = false;
     int code_ = 0;
 };
+
+/// Whether `is_so` came true before `limit` was over. It is asked fifty times a second: how fast
+/// the machine is says nothing but how long this takes.
+bool eventually(const std::function<bool()>& is_so,
+                std::chrono::seconds limit = std::chrono::seconds(60));
+
+/// A UDP port of the loopback interface that nobody has at this moment, for programs that must
+/// agree on one beforehand. Throws std::runtime_error where there is none.
+std::uint16_t free_port();
 
 std::string read_file(const std::filesystem::path& path);
 

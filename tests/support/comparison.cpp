@@ -12,6 +12,7 @@
 #include "common/mesh_distance.hpp"
 #include "common/mesh_topology.hpp"
 #include "common/model_io.hpp"
+#include "common/self_intersection.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/floor.hpp"
 #ifdef ELLICAST_WITH_CGAL
@@ -67,7 +68,7 @@ const VariantObject* find_variant(const ComparedModel& model, std::string_view n
 }
 
 // The received records as the variant's stream would have had them.
-receiver::ReceivedObject received_as(const VariantObject& variant,
+receiver::ReceivedObject received_as(const VariantObject& variant, const ComparedModel& model,
                                      const receiver::ReceivedObject& plain) {
     receiver::ReceivedObject object = plain;
     object.id = variant.object.id;
@@ -75,6 +76,15 @@ receiver::ReceivedObject received_as(const VariantObject& variant,
     for (std::size_t k = 0; k < object.vertices.size(); ++k) {
         object.vertices[k] = variant.object.vertices[object.vertex_index[k]];
     }
+    // Whose places in the order of sending arrived.
+    const std::vector<protocol::EdgeRecord>& sent = model.plain.loaded.object.edges;
+    object.edges.clear();
+    for (std::size_t k = 0; k < std::min(sent.size(), variant.object.edges.size()); ++k) {
+        if (std::binary_search(plain.edges.begin(), plain.edges.end(), sent[k])) {
+            object.edges.push_back(variant.object.edges[k]);
+        }
+    }
+    std::sort(object.edges.begin(), object.edges.end());
     return object;
 }
 
@@ -82,7 +92,7 @@ void run_ellicast(const VariantObject& variant, Work& work) {
     ComparisonRow& row = work.row;
     row.stream_bytes = variant.stream_bytes;
     row.bytes = scaled(row.bytes, variant.stream_bytes, work.model.stream_bytes);
-    const receiver::ReceivedObject object = received_as(variant, work.reception.object);
+    const receiver::ReceivedObject object = received_as(variant, work.model, work.reception.object);
     receiver::ReconstructionOptions how;
     how.threads = 1;
     variant.variant.configure(how);
@@ -181,21 +191,6 @@ void check_same_records(const sender::BroadcastObject& a, const sender::Broadcas
     if (!same) throw std::runtime_error("a variant's records are not those of the plain object");
 }
 
-std::vector<std::uint32_t> records_of_original(const SimulatedModel& model) {
-    std::map<std::array<float, 3>, std::uint32_t> record_at;
-    const auto& vertices = model.loaded.object.vertices;
-    for (std::uint32_t r = 0; r < vertices.size(); ++r) record_at[vertices[r].position] = r;
-    const Eigen::Vector3d origin(model.loaded.object.description.origin.data());
-    std::vector<std::uint32_t> record_of;
-    record_of.reserve(model.original.positions.size());
-    for (const Eigen::Vector3d& p : model.original.positions) {
-        const Eigen::Vector3f q = (p - origin).cast<float>();
-        const auto it = record_at.find({q.x(), q.y(), q.z()});
-        record_of.push_back(it == record_at.end() ? ComparedModel::kNoRecord : it->second);
-    }
-    return record_of;
-}
-
 }  // namespace
 
 const std::vector<Variant>& variants() {
@@ -286,6 +281,21 @@ CellReception receive_cell(const ComparedModel& model, const Cell& cell, double 
     reception.datagrams = arrived.size();
     if (auto received = receive(arrived).object) reception.object = std::move(*received);
     return reception;
+}
+
+std::vector<std::uint32_t> records_of_original(const SimulatedModel& model) {
+    std::map<std::array<float, 3>, std::uint32_t> record_at;
+    const auto& vertices = model.loaded.object.vertices;
+    for (std::uint32_t r = 0; r < vertices.size(); ++r) record_at[vertices[r].position] = r;
+    const Eigen::Vector3d origin(model.loaded.object.description.origin.data());
+    std::vector<std::uint32_t> record_of;
+    record_of.reserve(model.original.positions.size());
+    for (const Eigen::Vector3d& p : model.original.positions) {
+        const Eigen::Vector3f q = (p - origin).cast<float>();
+        const auto it = record_at.find({q.x(), q.y(), q.z()});
+        record_of.push_back(it == record_at.end() ? ComparedModel::kNoRecord : it->second);
+    }
+    return record_of;
 }
 
 std::vector<bool> kept_vertices(const ComparedModel& model,

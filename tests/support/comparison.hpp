@@ -76,6 +76,9 @@ struct CellReception {
 };
 CellReception receive_cell(const ComparedModel& model, const Cell& cell, double burst);
 
+/// The record of each vertex of the original, or kNoRecord.
+std::vector<std::uint32_t> records_of_original(const SimulatedModel& model);
+
 /// The original's vertices that were received.
 std::vector<bool> kept_vertices(const ComparedModel& model, const receiver::ReceivedObject& object);
 

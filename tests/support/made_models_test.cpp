@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/mesh_topology.hpp"
+#include "common/self_intersection.hpp"
 
 using namespace ellicast::common;
 using namespace ellicast::tests;

@@ -51,6 +51,16 @@ class UdpSink {
 
     [[nodiscard]] std::uint16_t port() const { return port_; }
 
+    /// Waits until `count` datagrams came; false when 20 s passed without them.
+    [[nodiscard]] bool await(std::size_t count) const {
+        const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+        while (count_ < count) {
+            if (std::chrono::steady_clock::now() > give_up) return false;
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+        return true;
+    }
+
     /// What came until now; waits for silence of 200 ms first. Nothing is kept from then on.
     const std::vector<std::vector<std::uint8_t>>& datagrams() {
         stop();
@@ -67,7 +77,9 @@ class UdpSink {
                 continue;
             }
             const ssize_t size = ::recv(socket_, buffer.data(), buffer.size(), 0);
-            if (size >= 0) datagrams_.emplace_back(buffer.begin(), buffer.begin() + size);
+            if (size < 0) continue;
+            datagrams_.emplace_back(buffer.begin(), buffer.begin() + size);
+            ++count_;
         }
     }
     void stop() {
@@ -78,6 +90,7 @@ class UdpSink {
     int socket_;
     std::uint16_t port_ = 0;
     std::atomic<bool> stopping_{false};
+    std::atomic<std::size_t> count_{0};
     std::vector<std::vector<std::uint8_t>> datagrams_;
     std::thread reader_;
 };

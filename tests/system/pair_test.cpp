@@ -1,9 +1,4 @@
 // tests/system/pair_test.cpp: both real programs, joined over loopback.
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
@@ -30,20 +25,6 @@ using Arguments = std::vector<std::string>;
 using Bits = std::array<float, 3>;
 
 namespace {
-
-/// A port that nobody has at this moment, for programs that must agree on one beforehand.
-std::uint16_t free_port() {
-    const int socket = ::socket(AF_INET, SOCK_DGRAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t length = sizeof(address);
-    const bool bound = ::bind(socket, reinterpret_cast<sockaddr*>(&address), length) == 0 &&
-                       ::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &length) == 0;
-    ::close(socket);
-    REQUIRE(bound);
-    return ntohs(address.sin_port);
-}
 
 /// Options that stand already are left alone.
 void add_defaults(const std::vector<std::array<std::string, 2>>& defaults, Arguments& arguments) {
@@ -77,6 +58,7 @@ class Pair {
             {"--listen", "127.0.0.1:" + port_},
             {"--output", output()},
             {"--report", path("received.json").string()},
+            {"--status", path("status.json").string()},
             {"--grid", "40"},
             {"--idle-timeout", "1"}};
         add_defaults(usual, arguments);
@@ -115,6 +97,14 @@ class Pair {
         return json::parse(tests::read_file(path("received.json")));
     }
     [[nodiscard]] json sent() const { return json::parse(tests::read_file(path("sent.json"))); }
+    /// Waits until the receiver has seen all that the sender sent to its end.
+    void await_all_received() const {
+        REQUIRE(tests::eventually([&] {
+            const json status = json::parse(tests::read_file(path("status.json")), nullptr, false);
+            return !status.is_discarded() &&
+                   status["datagrams"]["received"] == sent()["sending"]["datagrams"]["sent"];
+        }));
+    }
     [[nodiscard]] common::MeshTopology topology() const { return topology_of(output()); }
     static common::MeshTopology topology_of(const std::filesystem::path& file) {
         return common::analyse_topology(common::read_model(file));
@@ -122,7 +112,7 @@ class Pair {
 
   private:
     tests::TemporaryDirectory directory_;
-    std::string port_ = std::to_string(free_port());
+    std::string port_ = std::to_string(tests::free_port());
     std::optional<ChildProcess> receiver_;
     std::optional<ChildProcess> sender_;
 };
@@ -286,7 +276,7 @@ TEST_CASE("of two models in a stream one is shown, whole and not mixed") {
     SECTION("the richer one, when all is heard") {
         pair.listen({"--until", "forever"});
         pair.send({pair.ball(), pair.ring()});
-        std::this_thread::sleep_for(200ms);
+        pair.await_all_received();
         pair.receiver().send_signal(SIGINT);
         REQUIRE(pair.receiver().wait() == 0);
         const json received = pair.received();
@@ -361,6 +351,56 @@ TEST_CASE("every stage's mesh is there and closed") {
     CHECK(tests::read_file(pair.path("stages") / "4-final.ply") == tests::read_file(pair.output()));
 }
 
+TEST_CASE("live meshes are there before the end, closed, and change nothing of the result") {
+    Pair pair;
+    pair.listen();
+    pair.send({pair.ring(), "--rate", "150k"});
+    REQUIRE(pair.receiver().wait() == 0);
+    const std::string without = tests::read_file(pair.output());
+    CHECK(pair.received()["live"].is_null());
+
+    pair.listen({"--live", pair.path("live.ply").string(), "--live-stages",
+                 pair.path("series").string(), "--update-interval", "0.2", "--until", "forever",
+                 "--idle-timeout", "60"});
+    // Time enough for two meshes on whatever machine, with sanitizers too.
+    pair.start_slow_sender({"--rounds", "forever"});
+    const std::filesystem::path second = pair.path("series") / "00002.ply";
+    for (int n = 0; n < 300 && !std::filesystem::exists(second); ++n) {
+        std::this_thread::sleep_for(100ms);
+    }
+    REQUIRE(std::filesystem::exists(second));
+    CHECK(Pair::topology_of(pair.path("live.ply")).closed);
+    REQUIRE(tests::eventually([&] {
+        return json::parse(tests::read_file(pair.path("status.json")))["pages"][0]["complete"] ==
+               true;
+    }));
+    pair.receiver().send_signal(SIGINT);
+    REQUIRE(pair.receiver().wait() == 0);
+    pair.sender().send_signal(SIGINT);
+    REQUIRE(pair.sender().wait() == 0);
+    CHECK(tests::read_file(pair.output()) == without);
+    CHECK(tests::read_file(pair.path("live.ply")) == without);
+
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(pair.path("series"))) {
+        CHECK(Pair::topology_of(entry.path()).closed);
+        ++files;
+    }
+    const json live = pair.received()["live"];
+    CHECK(files > 1);
+    CHECK(live["updates"].get<std::size_t>() <= files);
+    CHECK(live["first_shape_ms"].get<double>() <= live["last"]["ms"].get<double>());
+}
+
+TEST_CASE("an interval of zero makes no live mesh") {
+    Pair pair;
+    pair.listen({"--live", pair.path("live.ply").string(), "--update-interval", "0"});
+    pair.send({pair.ring()});
+    REQUIRE(pair.receiver().wait() == 0);
+    CHECK(pair.received()["live"].is_null());
+    CHECK_FALSE(std::filesystem::exists(pair.path("live.ply")));
+}
+
 TEST_CASE("option --until says when it is enough") {
     Pair pair;
     SECTION("complete: rounds go on until nothing is missing") {
@@ -388,7 +428,7 @@ TEST_CASE("option --until says when it is enough") {
     SECTION("forever: only Ctrl-C ends it") {
         pair.listen({"--until", "forever", "--idle-timeout", "0.1"});
         pair.send({pair.ring()});
-        std::this_thread::sleep_for(500ms);
+        pair.await_all_received();
         pair.receiver().send_signal(SIGINT);
         REQUIRE(pair.receiver().wait() == 0);
         CHECK(pair.received()["ends_by"] == "interrupted");

@@ -168,6 +168,11 @@ TEST_CASE("what the user got wrong is said in one line that names it, and exits 
         {{"--listen", "127.0.0.1:70000"}, "--listen"},
         {{"--listen", "no-such-host.invalid:5004"}, "no-such-host.invalid"},
         {{"--listen", "192.0.2.1:5004"}, "192.0.2.1:5004"},
+        {{"--sdp", nowhere}, nowhere},
+        {{"--sdp", directory.path().string()}, directory.path().string()},
+        {{"--sdp", file}, file + ": line 1: expected"},
+        {{"--sdp", file, "--listen", ":5004"}, "--listen"},
+        {{"--sdp", file, "--source", "10.0.0.1"}, "--source"},
         {{"--grid", "2"}, "--grid"},
         {{"--until", "tomorrow"}, "--until"},
         {{"--conceal", "maybe"}, "--conceal"},
@@ -410,8 +415,14 @@ TEST_CASE("what the kernel had no room for is counted, apart from the network's 
     MadeStream stream;
     stream.rounds = 0;
     auto round = made_datagrams(sphere(), stream);
-    Receiver receiver({"--until", "forever"});
+    const tests::TemporaryDirectory place;
+    const std::string status = (place.path() / "status.json").string();
+    Receiver receiver({"--until", "forever", "--status", status});
     const Sender sender(receiver.port());
+    const auto seen = [](const nlohmann::json& counts) {
+        return counts["received"].get<std::size_t>() - counts["duplicate"].get<std::size_t>() +
+               counts["lost"].get<std::size_t>();
+    };
     receiver.process->send_signal(SIGSTOP);
     std::uint16_t sequence = stream.first_sequence;
     for (std::uint32_t r = 0; r < kRounds; ++r) {
@@ -424,18 +435,20 @@ TEST_CASE("what the kernel had no room for is counted, apart from the network's 
         sender.send(round, 0us);
     }
     receiver.process->send_signal(SIGCONT);
-    std::this_thread::sleep_for(500ms);
-    sender.send({round.back()});  // a last copy tells how far the numbers went
-    std::this_thread::sleep_for(100ms);
+    // A copy of the last one tells how far the numbers went, once the queue has room for it.
+    const std::size_t sent = kRounds * round.size();
+    REQUIRE(tests::eventually([&] {
+        sender.send({round.back()});
+        const std::string text = tests::read_file(status);
+        return !text.empty() && seen(nlohmann::json::parse(text)["datagrams"]) >= sent;
+    }));
     receiver.process->send_signal(SIGINT);
     CHECK(receiver.process->wait() == 0);
     const auto counts = receiver.report()["datagrams"];
     CAPTURE(counts.dump(2));
     CHECK(counts["kernel_dropped"] > 0);
     CHECK(counts["lost_in_network"] == 0);
-    CHECK(counts["received"].get<std::size_t>() - counts["duplicate"].get<std::size_t>() +
-              counts["lost"].get<std::size_t>() ==
-          kRounds * round.size());
+    CHECK(seen(counts) == sent);
     CHECK(holds(receiver.process->err(), "the kernel dropped"));
 }
 

@@ -205,3 +205,44 @@ TEST_CASE("losses in bursts have the share and the length asked for") {
     CHECK_THROWS_AS(tests::bursty_loss(0.9, 2), std::invalid_argument);
     CHECK_THROWS_AS(tests::bursty_loss(0.3, 0.5), std::invalid_argument);
 }
+
+TEST_CASE("a blackout of two seconds in a stream of ten leaves a closed mesh, evenly sampled") {
+    // As slow as that: the same datagrams, farther apart.
+    std::vector<tests::TimedDatagram> sent = tests::broadcast(ring().loaded.object);
+    const auto start = sent.front().at;
+    const auto lasted = sent.back().at - start;
+    const double begin = GENERATE(0.0, 2.0, 4.0, 7.9);  // seconds
+    CAPTURE(begin);
+    std::vector<tests::TimedDatagram> heard;
+    for (tests::TimedDatagram& datagram : sent) {
+        const double at = 10.0 * std::chrono::duration<double>(datagram.at - start) / lasted;
+        datagram.at = start + std::chrono::nanoseconds(static_cast<std::int64_t>(at * 1e9));
+        if (at < begin || at >= begin + 2.0) heard.push_back(datagram);
+    }
+    receiver::SessionOptions options;
+    options.idle_timeout = std::chrono::seconds(3);
+    options.wait = std::chrono::seconds(10);
+    const tests::SimulatedReception reception = tests::receive(heard, options);
+    REQUIRE(reception.object);
+    const receiver::StreamCounts& counts = reception.summary.datagrams;
+    CHECK(counts.received == heard.size());
+    const std::uint64_t lost = sent.size() - heard.size();
+    if (begin > 0.0) {
+        CHECK(counts.lost == lost);
+        CHECK(counts.pattern.longest_run == lost);
+    }
+    const receiver::Reconstruction result = rebuilt(*reception.object);
+    CHECK(is_closed_manifold(result.mesh));
+    CHECK(result.topology_as_promised);
+
+    // Octants of the ring have equal shares of its vertices, and should have of the received.
+    std::array<double, 8> octants{};
+    for (const Eigen::Vector3d& p : tests::received_positions(*reception.object)) {
+        octants[(p.x() > 0 ? 1 : 0) + (p.y() > 0 ? 2 : 0) + (p.z() > 0 ? 4 : 0)] += 1.0;
+    }
+    const double mean = static_cast<double>(reception.object->vertices.size()) / 8.0;
+    for (const double octant : octants) {
+        CHECK(octant > 0.8 * mean);
+        CHECK(octant < 1.2 * mean);
+    }
+}

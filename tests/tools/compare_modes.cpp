@@ -24,18 +24,6 @@
 namespace ellicast::tests {
 namespace {
 
-std::ofstream create(const std::filesystem::path& path) {
-    std::filesystem::create_directories(path.parent_path());
-    std::ofstream file(path);
-    if (!file) throw std::runtime_error("cannot write " + path.string());
-    return file;
-}
-
-void finish(std::ofstream& file, const std::filesystem::path& path) {
-    file.flush();
-    if (!file) throw std::runtime_error("cannot write " + path.string());
-}
-
 // Where nothing is lost, all seeds are one.
 void add_cells(double loss, double sent, unsigned seeds, std::vector<Cell>& cells) {
     for (unsigned seed = 1; seed <= (loss > 0 ? seeds : 1); ++seed) {
@@ -145,6 +133,18 @@ BurstPair run_burst_pair(const ComparedModel& model, unsigned seed,
 }
 
 }  // namespace
+
+std::ofstream create(const std::filesystem::path& path) {
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream file(path);
+    if (!file) throw std::runtime_error("cannot write " + path.string());
+    return file;
+}
+
+void finish(std::ofstream& file, const std::filesystem::path& path) {
+    file.flush();
+    if (!file) throw std::runtime_error("cannot write " + path.string());
+}
 
 void run_jobs(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& body) {
     if (jobs == 0) jobs = std::max(1u, std::thread::hardware_concurrency());

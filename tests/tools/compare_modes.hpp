@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <vector>
 
@@ -21,6 +22,12 @@ struct CompareOptions {
     ComparisonOptions comparison;
 };
 
+/// Opens a file for writing, and its directory; throws std::runtime_error.
+std::ofstream create(const std::filesystem::path& path);
+
+/// Throws std::runtime_error where not all could be written.
+void finish(std::ofstream& file, const std::filesystem::path& path);
+
 /// body(k) for k in [0, count), up to `jobs` at a time, in no order. The first exception is
 /// rethrown when all have ended.
 void run_jobs(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& body);
@@ -34,6 +41,11 @@ void write_tables(const std::filesystem::path& csv);
 /// Bursts of mean 20 datagrams at 20 % loss beside as many ellipsoids and vertices taken from
 /// anywhere: burst-check.csv, and a Markdown table of the medians of their rms on standard output.
 void check_bursts(const CompareOptions& options);
+
+/// All ellipsoids and the first 10, 25 and 50 % of the vertices, by importance and spread, with and
+/// without tags and concealment, and the floors of the same vertices: prefix-check.csv, and a
+/// Markdown table on standard output, with geometric means over the models at its end.
+void check_prefixes(const CompareOptions& options);
 
 /// The coarse stage alone, nothing lost, at 100, 200 and 400 ellipsoids: share of the joint volume
 /// that it has in common with the solid, and rms. coarse.csv, and Markdown on standard output.
