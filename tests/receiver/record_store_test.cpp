@@ -250,7 +250,7 @@ TEST_CASE("contradictory hints, other sessions and other addresses never mix") {
     for (const auto& group : store.groups()) CHECK(group.datagrams == 1);
 }
 
-TEST_CASE("the group with the most distinct records is shown; ties do not depend on order") {
+TEST_CASE("the group with the most distinct records is shown, ties do not depend on order") {
     const MadeObject a = made_sphere(600, 6, 1);
     const MadeObject b = made_sphere(600, 6, 2);
     const auto from_a = made_datagrams(a, session_of(1));

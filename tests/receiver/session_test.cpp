@@ -143,7 +143,7 @@ TEST_CASE("without the last datagram the silence ends reception, and the tail co
     CHECK(run.session.summary(run.now).datagrams.lost == 4);
 }
 
-TEST_CASE("the end of a middle round ends nothing; the end of the last one does") {
+TEST_CASE("the end of a middle round ends nothing, the end of the last one does") {
     Run run;
     const auto datagrams = made_datagrams(object(), stream_of(3));
     const std::size_t round = datagrams.size() / 3;

@@ -71,7 +71,7 @@ TEST_CASE("a sketch of extreme sizes is as good") {
     CHECK(common::analyse_topology(result->mesh).closed);
 }
 
-TEST_CASE("a sketch of nothing is none; one of a speck is none or closed") {
+TEST_CASE("a sketch of nothing is none, one of a speck is none or closed") {
     CHECK_FALSE(sketch(with_ellipsoids(0), 32, 1));
     ReceivedObject object = with_ellipsoids(1);
     for (std::size_t k = 3; k < 9; ++k) object.ellipsoids[0].scalars[k] *= 1e-5f;

@@ -103,7 +103,7 @@ TEST_CASE("a file put in the place of another is read, of the same size and time
     CHECK(fresh[0].page == 0);
 }
 
-TEST_CASE("a broken file gives nothing and is tried once; a sound one after it is taken") {
+TEST_CASE("a broken file gives nothing and is tried once, and a sound one after it is taken") {
     const Place place;
     const auto watch = place.watch();
     write(place.paths[0], "no number");

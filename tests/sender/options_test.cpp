@@ -253,7 +253,7 @@ TEST_CASE("what cannot be meant ends in exit code 2 and one line that names the 
     }
 }
 
-TEST_CASE("help shows every flag with examples, version the version; both end with 0") {
+TEST_CASE("help shows every flag with examples, version the version, both end with 0") {
     const Parsed help = parse({"--help"});
     REQUIRE(std::holds_alternative<int>(help.result));
     CHECK(std::get<int>(help.result) == 0);

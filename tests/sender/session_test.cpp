@@ -220,7 +220,7 @@ TEST_CASE("losing sections of one kind leaves the other kind, and drops what is 
     CHECK(kept < all_sections);
 }
 
-TEST_CASE("what reordering holds back comes out at the end; duplicates are counted") {
+TEST_CASE("what reordering holds back comes out at the end, duplicates are counted") {
     SessionOptions options;
     options.impairment.reorder = 0.5;
     options.impairment.duplicate = 0.2;

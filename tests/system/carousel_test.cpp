@@ -185,7 +185,7 @@ TEST_CASE("one page is chosen into a file, others into a directory") {
     stop(*sender);
 }
 
-TEST_CASE("a page that changes is a new version at whoever listens; a broken file is none") {
+TEST_CASE("a page that changes is a new version at whoever listens, a broken file is none") {
     Place place;
     const auto sender = place.sender();
     const auto receiver = place.receiver({"--until", "forever", "--drop", "0.2"});
@@ -282,7 +282,7 @@ TEST_CASE("a receiver that is killed and started again leaves no half file, and 
     stop(*sender);
 }
 
-TEST_CASE("SIGTERM lets the round end; a second one, or Ctrl-C, does not") {
+TEST_CASE("SIGTERM lets the round end, but neither a second one nor Ctrl-C does") {
     Place place;
     const auto sender = place.sender({}, "300k");
     REQUIRE(eventually([&] {
