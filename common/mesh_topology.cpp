@@ -154,7 +154,9 @@ MeshTopology analyse_topology(const TriangleMesh& mesh) {
                                  static_cast<std::int64_t>(result.faces));
     const Components components = find_components(half_edges, mesh.triangles.size());
     result.components = components.count;
-    if (components.count > 0) {
+    if (components.count == 1) {
+        result.euler_largest = result.euler;
+    } else if (components.count > 0) {
         const std::uint32_t largest = largest_component(mesh, components);
         result.euler_largest = euler_of(
             mesh, half_edges, [&](std::size_t f) { return components.of_face[f] == largest; });

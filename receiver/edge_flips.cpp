@@ -1,14 +1,10 @@
 // receiver/edge_flips.cpp
 #include "receiver/edge_flips.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <utility>
-
-#include "common/parallel.hpp"
-#include "receiver/flip_gains.hpp"
+#include <numeric>
 
 namespace ellicast::receiver {
 namespace {
@@ -63,149 +59,14 @@ bool keeps_orientation(const Corners& q, double min_cosine) {
     return n1.dot(n_old) > limit * n1.norm() && n2.dot(n_old) > limit * n2.norm();
 }
 
-// How much a first flip may cost, in mean edge lengths, when a second one is to make up for it.
-constexpr double kLookAhead = 1.0;
-
-std::array<HalfedgeId, 4> sides_of(const SurfaceMesh& mesh, HalfedgeId h) {
-    const HalfedgeId t = mesh.twin(h);
-    return {SurfaceMesh::next(h), SurfaceMesh::prev(h), SurfaceMesh::next(t), SurfaceMesh::prev(t)};
-}
-
-// Half-edges that speak for their edges.
-bool stands_for_edge(const SurfaceMesh& mesh, HalfedgeId h) {
-    return mesh.face_alive(SurfaceMesh::face_of(h)) && h < mesh.twin(h);
-}
-
-// Sweeps over the edges in slot order, again over those that a flip made doubtful.
-class Smoother {
-  public:
-    Smoother(SurfaceMesh& mesh, const FlipCriterion& criterion)
-        : mesh_(mesh),
-          threads_(criterion.threads),
-          gains_(mesh, criterion),
-          doubtful_(3 * mesh.face_slots()) {}
-
-    // `promising(h)` reads only, and is true of every edge on which `attempt(h)` would do anything.
-    template <class Promising, class Attempt>
-    std::size_t sweep(int passes, const Promising& promising, const Attempt& attempt) {
-        common::parallel_for(doubtful_.size(), threads_, [&](std::size_t begin, std::size_t end) {
-            for (auto h = static_cast<HalfedgeId>(begin); h < end; ++h) {
-                doubtful_[h] = stands_for_edge(mesh_, h) && promising(h);
-            }
-        });
-        std::size_t flips = 0;
-        for (int pass = 0; pass < passes; ++pass) {
-            const std::size_t before = flips;
-            for (HalfedgeId h = 0; h < doubtful_.size(); ++h) {
-                if (!doubtful_[h]) continue;
-                doubtful_[h] = 0;
-                if (stands_for_edge(mesh_, h)) flips += attempt(h);
-            }
-            if (flips == before) break;
-        }
-        return flips;
-    }
-
-    std::size_t sweep_single_flips(int passes) {
-        return sweep(
-            passes,
-            [&](HalfedgeId h) { return gains_.consider(h, least_gain()).gain > least_gain(); },
-            [&](HalfedgeId h) { return flip_one(h); });
-    }
-
-    std::size_t sweep_pairs_of_flips(int passes) {
-        return sweep(
-            passes,
-            [&](HalfedgeId h) { return may_pay_with_second(h, gains_.consider(h, look_ahead())); },
-            [&](HalfedgeId h) { return flip_two(h); });
-    }
-
-  private:
-    [[nodiscard]] double least_gain() const { return common::kLeastDiagonalGain * gains_.unit(); }
-
-    // What a first flip must gain, when a second one is to make up for what it lacks.
-    [[nodiscard]] double look_ahead() const { return -kLookAhead * gains_.unit(); }
-
-    std::size_t flip_one(HalfedgeId h) {
-        const FlipGains::Trial trial = gains_.consider(h, least_gain());
-        if (!(trial.gain > least_gain()) || !mesh_.can_flip(h)) return 0;
-        gains_.flip(h, trial);
-        mark(h, 1);
-        return 1;
-    }
-
-    // Whether flipping h, alone or with one of the edges around it, might gain enough.
-    [[nodiscard]] bool may_pay_with_second(HalfedgeId h, const FlipGains::Trial& first) const {
-        if (!(first.gain > look_ahead())) return false;
-        return first.gain > least_gain() ||
-               gains_.best_pair_gain(h, first, least_gain()) > least_gain();
-    }
-
-    // Flips h and then, where that helps, one of the four edges around it; neither when both
-    // together do not pay. Leads out of the local minima of flip_one: a crease two triangles wide,
-    // say.
-    std::size_t flip_two(HalfedgeId h) {
-        const FlipGains::Trial first = gains_.consider(h, look_ahead());
-        if (!may_pay_with_second(h, first) || !mesh_.can_flip(h)) return 0;
-        gains_.flip(h, first);
-        const double missing = least_gain() - first.gain;  // for the second flip to beat
-        const auto [second, trial] = best_beside(h, std::max(missing, 0.0));
-        if (second == kNone && !(missing < 0.0)) {
-            gains_.undo(h, first);
-            return 0;
-        }
-        mark(h, 2);
-        if (second == kNone) return 1;
-        gains_.flip(second, trial);
-        mark(second, 2);
-        return 2;
-    }
-
-    // The edge around h whose flip gains most, if more than `gain`; kNone otherwise.
-    std::pair<HalfedgeId, FlipGains::Trial> best_beside(HalfedgeId h, double gain) const {
-        std::pair<HalfedgeId, FlipGains::Trial> best{kNone, {}};
-        for (const HalfedgeId side : sides_of(mesh_, h)) {
-            const FlipGains::Trial trial = gains_.consider(side, gain);
-            if (trial.gain > gain && mesh_.can_flip(side)) {
-                best = {side, trial};
-                gain = trial.gain;
-            }
-        }
-        return best;
-    }
-
-    // A flip changes the gain of the edges of its two faces and of their neighbours' edges, and
-    // that of pairs one face further.
-    void mark(HalfedgeId h, int faces) {
-        for (const HalfedgeId side : sides_of(mesh_, h)) mark_beyond(side, faces);
-    }
-    void mark_beyond(HalfedgeId side, int faces) {
-        const HalfedgeId beyond = mesh_.twin(side);
-        doubtful_[std::min(side, beyond)] = 1;
-        if (faces == 0) return;
-        mark_beyond(SurfaceMesh::next(beyond), faces - 1);
-        mark_beyond(SurfaceMesh::prev(beyond), faces - 1);
-    }
-
-    SurfaceMesh& mesh_;
-    unsigned threads_;
-    FlipGains gains_;
-    std::vector<char> doubtful_;
-};
-
-}  // namespace
-
-double triangle_quality(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-    const double sides = (b - a).squaredNorm() + (c - b).squaredNorm() + (a - c).squaredNorm();
-    if (!(sides > 0.0)) return 0.0;
-    return 2.0 * std::numbers::sqrt3 * normal_of(a, b, c).norm() / sides;
-}
-
-std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue) {
+// Edges that are not `near` are left out.
+template <class Near>
+std::size_t flip_near(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue, const Near& near) {
     std::size_t flips = 0;
     while (!queue.empty()) {
         const HalfedgeId h = queue.back();
         queue.pop_back();
+        if (!near(h)) continue;
         const Corners q = corners_of(mesh, h);
         if (!violates_delaunay(q) || !keeps_orientation(q, kMinTurnCosine) || !mesh.can_flip(h)) {
             continue;
@@ -217,24 +78,54 @@ std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue) 
     return flips;
 }
 
-std::size_t flip_all_to_delaunay(SurfaceMesh& mesh, unsigned threads) {
-    std::vector<char> doubtful(3 * mesh.face_slots());
-    common::parallel_for(doubtful.size(), threads, [&](std::size_t begin, std::size_t end) {
-        for (auto h = static_cast<HalfedgeId>(begin); h < end; ++h) {
-            doubtful[h] = stands_for_edge(mesh, h) && violates_delaunay(corners_of(mesh, h));
-        }
-    });
-    std::vector<HalfedgeId> queue;
-    for (HalfedgeId h = 0; h < doubtful.size(); ++h) {
-        if (doubtful[h]) queue.push_back(h);
-    }
-    return flip_to_delaunay(mesh, queue);
+}  // namespace
+
+std::array<HalfedgeId, 4> sides_of(const SurfaceMesh& mesh, HalfedgeId h) {
+    const HalfedgeId t = mesh.twin(h);
+    return {SurfaceMesh::next(h), SurfaceMesh::prev(h), SurfaceMesh::next(t), SurfaceMesh::prev(t)};
 }
 
-std::size_t flip_to_smooth(SurfaceMesh& mesh, const FlipCriterion& criterion, int passes) {
-    Smoother smoother(mesh, criterion);
-    const std::size_t flips = smoother.sweep_single_flips(passes);
-    return criterion.pairs ? flips + smoother.sweep_pairs_of_flips(passes) : flips;
+double triangle_quality(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+    const double sides = (b - a).squaredNorm() + (c - b).squaredNorm() + (a - c).squaredNorm();
+    if (!(sides > 0.0)) return 0.0;
+    return 2.0 * std::numbers::sqrt3 * normal_of(a, b, c).norm() / sides;
+}
+
+std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue) {
+    return flip_near(mesh, queue, [](HalfedgeId) { return true; });
+}
+
+std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue,
+                             const MeshRegions& regions, std::vector<HalfedgeId>& put_off) {
+    return flip_near(mesh, queue, [&](HalfedgeId h) {
+        const bool near = is_inner(mesh, regions, h);
+        if (!near) put_off.push_back(h);
+        return near;
+    });
+}
+
+std::size_t flip_all_to_delaunay(SurfaceMesh& mesh, unsigned threads) {
+    const MeshRegions regions(mesh, false, threads);
+    std::vector<std::vector<HalfedgeId>> put_off(regions.count());
+    std::vector<std::size_t> made(regions.count(), 0);
+    regions.for_each(threads, [&](std::size_t region) {
+        std::vector<HalfedgeId> queue;
+        for (const FaceId f : regions.faces(region)) {
+            for (unsigned corner = 0; corner < 3; ++corner) {
+                const HalfedgeId h = SurfaceMesh::halfedge(f, corner);
+                if (!stands_for_edge(mesh, h)) continue;
+                if (!is_inner(mesh, regions, h)) {
+                    put_off[region].push_back(h);
+                } else if (violates_delaunay(corners_of(mesh, h))) {
+                    queue.push_back(h);
+                }
+            }
+        }
+        made[region] = flip_to_delaunay(mesh, queue, regions, put_off[region]);
+    });
+    std::size_t flips = std::accumulate(made.begin(), made.end(), std::size_t{0});
+    for (std::vector<HalfedgeId>& queue : put_off) flips += flip_to_delaunay(mesh, queue);
+    return flips;
 }
 
 }  // namespace ellicast::receiver

@@ -1,12 +1,11 @@
 // receiver/edge_flips.hpp
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <span>
 #include <vector>
 
-#include "common/diagonal_choice.hpp"
-#include "receiver/edge_constraints.hpp"
+#include "receiver/mesh_regions.hpp"
 #include "receiver/surface_mesh.hpp"
 
 namespace ellicast::receiver {
@@ -18,31 +17,28 @@ namespace ellicast::receiver {
 /// lowers the Dirichlet energy.
 std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue);
 
-/// As above with all edges in the queue. Which of them need a look is found on `threads` threads
-/// (0: one per core), which do not change the result.
+/// As above within a region of `regions`, while others are at work: an edge at one of whose four
+/// corners two regions meet goes to `put_off` instead.
+std::size_t flip_to_delaunay(SurfaceMesh& mesh, std::vector<HalfedgeId>& queue,
+                             const MeshRegions& regions, std::vector<HalfedgeId>& put_off);
+
+/// As above with all edges in the queue, on `threads` threads (0: one per core), which do not
+/// change the result.
 std::size_t flip_all_to_delaunay(SurfaceMesh& mesh, unsigned threads = 0);
 
-/// What a flip is judged by beside creases; see common/diagonal_choice.hpp.
-struct FlipCriterion {
-    std::span<const Eigen::Vector3d> normals = {};  // unit, per vertex slot; or none at all
-    common::DiagonalWeights weights = {};
-    /// Per vertex slot: not 0 where the sender marked it. Empty: nowhere.
-    std::span<const char> marks = {};
-    /// Per vertex slot: not 0 where the ring must stay as it is. Empty: nowhere.
-    std::span<const char> settled = {};
-    /// Edges that stay.
-    const FixedEdges* fixed = nullptr;
-    bool pairs = true;     // flip two at a time as well
-    unsigned threads = 0;  // 0: one per core; does not change the result
-};
+/// Half-edges next(h), prev(h), and those of h's twin.
+std::array<HalfedgeId, 4> sides_of(const SurfaceMesh& mesh, HalfedgeId h);
 
-/// Flips that lower the sum over all edges of length x (dihedral angle + 0.1 rad): few and gentle
-/// creases, and short edges where the surface is flat. First single flips to a local minimum, then
-/// pairs of neighbouring flips. All edges are judged at once, on several threads; those that
-/// promise a gain are then flipped in slot order, and so are those made doubtful by that, at most
-/// `passes` times. Never makes a triangle thinner than the thinner of those it replaces, unless it
-/// stays above quality 0.02. Returns the number of flips.
-std::size_t flip_to_smooth(SurfaceMesh& mesh, const FlipCriterion& criterion = {}, int passes = 8);
+/// Whether h, of an edge's two half-edges, speaks for it; false in dead faces.
+inline bool stands_for_edge(const SurfaceMesh& mesh, HalfedgeId h) {
+    return mesh.face_alive(SurfaceMesh::face_of(h)) && h < mesh.twin(h);
+}
+
+/// No region but one has faces at the four corners of h's two faces.
+inline bool is_inner(const SurfaceMesh& mesh, const MeshRegions& regions, HalfedgeId h) {
+    return regions.inner(SurfaceMesh::face_of(h)) &&
+           regions.inner(SurfaceMesh::face_of(mesh.twin(h)));
+}
 
 /// Quality of a triangle: 4 sqrt(3) area / sum of squared sides; 1 equilateral, 0 degenerate.
 double triangle_quality(const Eigen::Vector3d& a, const Eigen::Vector3d& b,

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/diagonal_choice.hpp"
+#include "common/fast_angle.hpp"
 #include "common/parallel.hpp"
 #include "receiver/float_lanes.hpp"
 
@@ -21,24 +22,8 @@ using Eigen::Vector3f;
 // Triangle quality below which a smoothing flip may not go, unless it was lower before.
 constexpr float kThinnest = 0.02F;
 
-// Angle between the positive x axis and (x, y), y >= 0: minimax polynomial of the arc tangent over
-// [0, 1], off by at most 3e-7. A third of the time of std::atan2, and the same bits everywhere.
-float angle_of(float x, float y) {
-    const float magnitude = std::abs(x);
-    const float larger = std::max(magnitude, y);
-    if (!(larger > 0.0F)) return 0.0F;
-    const float t = std::min(magnitude, y) / larger;
-    const float q = t * t;
-    const float low = t * (0.9999961116F + q * (-0.3331736806F + q * 0.1980781557F));
-    const float high =
-        -0.1323334207F + q * (0.0796236715F + q * (-0.03360421956F + q * 0.006811792907F));
-    const float acute = low + t * q * q * q * high;
-    const float right = y > magnitude ? 0.5F * std::numbers::pi_v<float> - acute : acute;
-    return x < 0.0F ? std::numbers::pi_v<float> - right : right;
-}
-
 float angle_between(const Vector3f& n, const Vector3f& m) {
-    return angle_of(n.dot(m), n.cross(m).norm());
+    return common::angle_of(n.dot(m), n.cross(m).norm());
 }
 
 // In mean edge lengths, more than what sums of doubles lose when their order changes.
@@ -46,7 +31,7 @@ constexpr double kBoundRounding = 1e-9;
 
 // Corners of an edge's two triangles, a b c and b a d, relative to a: what is subtracted in double
 // is small and exact enough in float.
-struct Corners {
+struct QuadCorners {
     Vector3f b, c, d;
 };
 
@@ -56,7 +41,7 @@ float quality(float twice_area, float sum_of_squares) {
 }
 
 // The flip leaves a needle.
-bool too_thin(const Corners& q, const QuadCosts& now, const QuadCosts& flipped) {
+bool too_thin(const QuadCorners& q, const std::array<Vector3f, 2>& now, const QuadCosts& flipped) {
     const float ab = q.b.squaredNorm();
     const float bc = (q.c - q.b).squaredNorm();
     const float ca = q.c.squaredNorm();
@@ -66,12 +51,12 @@ bool too_thin(const Corners& q, const QuadCosts& now, const QuadCosts& flipped) 
     const float after = std::min(quality(flipped.normals[0].norm(), cd + db + bc),
                                  quality(flipped.normals[1].norm(), cd + ca + ad));
     if (after >= kThinnest) return false;
-    return after < std::min(quality(now.normals[0].norm(), ab + bc + ca),
-                            quality(now.normals[1].norm(), ab + ad + db));
+    return after <
+           std::min(quality(now[0].norm(), ab + bc + ca), quality(now[1].norm(), ab + ad + db));
 }
 
 // DiagonalGain::angle.
-float angle_gain(const Corners& q) {
+float angle_gain(const QuadCorners& q) {
     const Vector3f bc = q.b - q.c;
     const Vector3f bd = q.b - q.d;
     const Lanes angles =
@@ -85,8 +70,9 @@ float rise_over(const Vector3f& edge, const Vector3d& n, const Vector3d& m) {
 }
 
 // DiagonalGain::rise.
-float rise_gain(const Corners& q, const QuadCosts& now, const std::array<const Vector3d*, 4>& n) {
-    const Vector3f up = (now.normals[0] + now.normals[1]).normalized();
+float rise_gain(const QuadCorners& q, const std::array<Vector3f, 2>& now,
+                const std::array<const Vector3d*, 4>& n) {
+    const Vector3f up = (now[0] + now[1]).normalized();
     const float z = 0.5F * (q.c + q.d - q.b).dot(up);
     const auto nearer = [z](float surface) { return std::abs(surface) - std::abs(surface - z); };
     const float after_ab = nearer(rise_over(q.b, *n[0], *n[1]));
@@ -97,7 +83,7 @@ float rise_gain(const Corners& q, const QuadCosts& now, const std::array<const V
 }
 
 // No rise is more than the height of cd's middle over ab's, and some more for rounding.
-double most_rise_gain(const Corners& q) {
+double most_rise_gain(const QuadCorners& q) {
     constexpr float kMore = 0.5F * 1.0001F;
     return static_cast<double>(kMore * (q.c + q.d - q.b).norm());
 }
@@ -113,14 +99,13 @@ double mark_gain(const std::array<VertexId, 4>& id, const FlipCriterion& criteri
 
 }  // namespace
 
-FlipGains::FlipGains(SurfaceMesh& mesh, const FlipCriterion& criterion)
+FlipGains::FlipGains(SurfaceMesh& mesh, unsigned threads)
     : mesh_(mesh),
-      criterion_(criterion),
-      unit_(mean_edge_length(mesh)),
+      unit_(mean_edge_length(mesh, threads)),
       normals_(mesh.face_slots()),
       creases_(3 * mesh.face_slots(), 0.0F) {
     const auto in_parallel = [&](std::size_t count, const auto& body) {
-        common::parallel_for(count, criterion.threads, [&](std::size_t begin, std::size_t end) {
+        common::parallel_for(count, threads, [&](std::size_t begin, std::size_t end) {
             for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) body(i);
         });
     };
@@ -135,82 +120,31 @@ FlipGains::FlipGains(SurfaceMesh& mesh, const FlipCriterion& criterion)
     });
 }
 
-bool FlipGains::settled(const FlipRegion& region) const {
-    if (criterion_.fixed != nullptr &&
-        criterion_.fixed->contains(region.corners[0], region.corners[1])) {
+bool FlipGains::settled(const Corners& corners) const {
+    if (criterion_.fixed != nullptr && criterion_.fixed->contains(corners[0], corners[1])) {
         return true;
     }
     if (criterion_.settled.empty()) return false;
-    return std::any_of(region.corners.begin(), region.corners.end(),
+    return std::any_of(corners.begin(), corners.end(),
                        [&](VertexId v) { return criterion_.settled[v] != 0; });
-}
-
-FlipRegion FlipGains::region_of(HalfedgeId h) const {
-    const HalfedgeId t = mesh_.twin(h);
-    const std::array<HalfedgeId, 4> sides = {SurfaceMesh::next(h), SurfaceMesh::prev(h),
-                                             SurfaceMesh::next(t), SurfaceMesh::prev(t)};
-    return {{mesh_.from_vertex(h), mesh_.to_vertex(h), mesh_.opposite(h), mesh_.opposite(t)},
-            {{normals_[SurfaceMesh::face_of(h)], normals_[SurfaceMesh::face_of(t)]},
-             {creases_[h], creases_[sides[0]], creases_[sides[1]], creases_[sides[2]],
-              creases_[sides[3]]}},
-            {normal_beyond(sides[0]), normal_beyond(sides[1]), normal_beyond(sides[2]),
-             normal_beyond(sides[3])}};
-}
-
-// Of an edge around h once h is flipped: d -> b, b -> c, c -> a or a -> d, as in QuadCosts. No face
-// beyond has two of them, or c and d were joined already and h could not be flipped.
-FlipRegion FlipGains::region_after(HalfedgeId h, const Trial& first, unsigned side) const {
-    const HalfedgeId t = mesh_.twin(h);
-    const std::array<HalfedgeId, 4> sides = {SurfaceMesh::prev(t), SurfaceMesh::next(h),
-                                             SurfaceMesh::prev(h), SurfaceMesh::next(t)};
-    const auto& [normals, creases] = first.flipped;
-    const unsigned face = side / 2;  // (c, d, b) or (d, c, a); its third edge is cd
-    const unsigned other = side ^ 1U;
-    const HalfedgeId s = sides[side];
-    const HalfedgeId y = mesh_.twin(s);
-    const VertexId third =
-        side % 2 == 0 ? mesh_.to_vertex(sides[other]) : mesh_.from_vertex(sides[other]);
-    FlipRegion region{{mesh_.from_vertex(s), mesh_.to_vertex(s), third, mesh_.opposite(y)},
-                      {{normals[face], normals_[SurfaceMesh::face_of(y)]},
-                       {creases[side + 1], creases[other + 1], creases[0],
-                        creases_[SurfaceMesh::next(y)], creases_[SurfaceMesh::prev(y)]}},
-                      {normal_beyond(sides[other]), normals[1 - face],
-                       normal_beyond(SurfaceMesh::next(y)), normal_beyond(SurfaceMesh::prev(y))}};
-    if (side % 2 != 0) {
-        std::swap(region.now.creases[1], region.now.creases[2]);
-        std::swap(region.beyond[0], region.beyond[1]);
-    }
-    return region;
-}
-
-FlipGains::Trial FlipGains::consider(HalfedgeId h, double needed) const {
-    return judge(region_of(h), needed);
-}
-
-double FlipGains::best_pair_gain(HalfedgeId h, const Trial& first, double needed) const {
-    double best = -std::numeric_limits<double>::infinity();
-    const double second = needed - first.gain - kBoundRounding * unit_;
-    for (unsigned side = 0; side < 4; ++side) {
-        best = std::max(best, judge(region_after(h, first, side), second).gain);
-    }
-    return first.gain + best;
 }
 
 // The terms are taken by price, and the rest let be once it cannot make up for what they lack:
 // what a new crease costs is never less than 0.
-FlipGains::Trial FlipGains::judge(const FlipRegion& region, double needed) const {
+template <class AskNormals>
+FlipGains::Trial FlipGains::judge(const Corners& id, const std::array<float, 5>& creases,
+                                  double needed, const AskNormals& ask_normals) const {
     Trial trial;
     trial.gain = -std::numeric_limits<double>::infinity();
-    if (settled(region)) return trial;
-    const auto& id = region.corners;
+    if (settled(id)) return trial;
     const Vector3d& a = mesh_.position(id[0]);
-    const Corners q{(mesh_.position(id[1]) - a).cast<float>(),
-                    (mesh_.position(id[2]) - a).cast<float>(),
-                    (mesh_.position(id[3]) - a).cast<float>()};
+    const QuadCorners q{(mesh_.position(id[1]) - a).cast<float>(),
+                        (mesh_.position(id[2]) - a).cast<float>(),
+                        (mesh_.position(id[3]) - a).cast<float>()};
     const Vector3f along_cd = q.d - q.c;
     const float cd = along_cd.norm();
     float gain = static_cast<float>(common::kDiagonalLengthWeight) * (q.b.norm() - cd);
-    for (const float crease : region.now.creases) gain += crease;
+    for (const float crease : creases) gain += crease;
     const bool rises = !criterion_.normals.empty() && criterion_.weights.rise != 0.0;
     const double marks = mark_gain(id, criterion_) * unit_;
     const double angles = criterion_.weights.angle != 0.0 ? criterion_.weights.angle * unit_ *
@@ -229,30 +163,84 @@ FlipGains::Trial FlipGains::judge(const FlipRegion& region, double needed) const
     gain -= flipped.creases[0];
     if (!(static_cast<double>(gain) + hope > needed)) return trial;
 
-    const auto& [bc, ca, ad, db] = region.beyond;
-    const Lanes creases = norm(Lanes3::of(q.b - q.d, q.c - q.b, q.c, q.d)) *
-                          angle_between(Lanes3::of(cdb, cdb, dca, dca), Lanes3::of(db, bc, ca, ad));
+    const Normals normals = ask_normals();
+    const auto& [bc, ca, ad, db] = normals.beyond;
+    const Lanes beyond = norm(Lanes3::of(q.b - q.d, q.c - q.b, q.c, q.d)) *
+                         angle_between(Lanes3::of(cdb, cdb, dca, dca), Lanes3::of(db, bc, ca, ad));
     for (std::size_t k = 0; k < 4; ++k) {
-        flipped.creases[k + 1] = creases[k];
-        gain -= creases[k];
+        flipped.creases[k + 1] = beyond[k];
+        gain -= beyond[k];
     }
     if (!(static_cast<double>(gain) + hope > needed)) return trial;
 
-    if (too_thin(q, region.now, flipped)) return trial;
-    trial.now = region.now;
+    if (too_thin(q, normals.now, flipped)) return trial;
+    trial.now = {normals.now, creases};
     trial.gain = static_cast<double>(gain) + marks;
     if (criterion_.weights.angle != 0.0) trial.gain += angles;
     if (rises) {
         const auto& n = criterion_.normals;
         trial.gain += criterion_.weights.rise *
                       static_cast<double>(
-                          rise_gain(q, region.now, {&n[id[0]], &n[id[1]], &n[id[2]], &n[id[3]]}));
+                          rise_gain(q, normals.now, {&n[id[0]], &n[id[1]], &n[id[2]], &n[id[3]]}));
     }
     return trial;
 }
 
+FlipGains::Trial FlipGains::consider(HalfedgeId h, double needed) const {
+    const HalfedgeId t = mesh_.twin(h);
+    const std::array<HalfedgeId, 4> sides = {SurfaceMesh::next(h), SurfaceMesh::prev(h),
+                                             SurfaceMesh::next(t), SurfaceMesh::prev(t)};
+    return judge({mesh_.from_vertex(h), mesh_.to_vertex(h), mesh_.opposite(h), mesh_.opposite(t)},
+                 {creases_[h], creases_[sides[0]], creases_[sides[1]], creases_[sides[2]],
+                  creases_[sides[3]]},
+                 needed, [&] {
+                     return Normals{
+                         {normals_[SurfaceMesh::face_of(h)], normals_[SurfaceMesh::face_of(t)]},
+                         {normal_beyond(sides[0]), normal_beyond(sides[1]), normal_beyond(sides[2]),
+                          normal_beyond(sides[3])}};
+                 });
+}
+
+// Of an edge around h once h is flipped: d -> b, b -> c, c -> a or a -> d, as in QuadCosts. No face
+// beyond has two of them, or c and d were joined already and h could not be flipped.
+FlipGains::Trial FlipGains::judge_after(HalfedgeId h, const Trial& first, unsigned side,
+                                        double needed) const {
+    const HalfedgeId t = mesh_.twin(h);
+    const std::array<HalfedgeId, 4> sides = {SurfaceMesh::prev(t), SurfaceMesh::next(h),
+                                             SurfaceMesh::prev(h), SurfaceMesh::next(t)};
+    const auto& [normals, creases] = first.flipped;
+    const unsigned face = side / 2;  // (c, d, b) or (d, c, a); its third edge is cd
+    const unsigned other = side ^ 1U;
+    const bool turned = side % 2 != 0;
+    const HalfedgeId s = sides[side];
+    const HalfedgeId y = mesh_.twin(s);
+    const VertexId third = turned ? mesh_.from_vertex(sides[other]) : mesh_.to_vertex(sides[other]);
+    const float beside = creases[other + 1];
+    return judge({mesh_.from_vertex(s), mesh_.to_vertex(s), third, mesh_.opposite(y)},
+                 {creases[side + 1], turned ? creases[0] : beside, turned ? beside : creases[0],
+                  creases_[SurfaceMesh::next(y)], creases_[SurfaceMesh::prev(y)]},
+                 needed, [&, &kept = normals] {
+                     const Eigen::Vector3f& outside = normal_beyond(sides[other]);
+                     const Eigen::Vector3f& inside = kept[1 - face];
+                     return Normals{{kept[face], normals_[SurfaceMesh::face_of(y)]},
+                                    {turned ? inside : outside, turned ? outside : inside,
+                                     normal_beyond(SurfaceMesh::next(y)),
+                                     normal_beyond(SurfaceMesh::prev(y))}};
+                 });
+}
+
+double FlipGains::best_pair_gain(HalfedgeId h, const Trial& first, double needed) const {
+    double best = -std::numeric_limits<double>::infinity();
+    const double second = needed - first.gain - kBoundRounding * unit_;
+    for (unsigned side = 0; side < 4; ++side) {
+        best = std::max(best, judge_after(h, first, side, second).gain);
+    }
+    return first.gain + best;
+}
+
 void FlipGains::set_crease(HalfedgeId h, float crease) {
-    creases_[h] = creases_[mesh_.twin(h)] = crease;
+    const HalfedgeId t = mesh_.twin(h);
+    creases_[h] = creases_[t] = crease;
 }
 
 void FlipGains::set(HalfedgeId h, const QuadCosts& costs) {

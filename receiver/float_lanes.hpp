@@ -42,8 +42,7 @@ inline Lanes norm(const Lanes3& n) {
     return root(dot(n, n));
 }
 
-/// Angles between the positive x axis and (x, y), y >= 0: minimax polynomial of the arc tangent
-/// over [0, 1], off by at most 3e-7. The same bits everywhere; 0 at the origin.
+/// common::angle_of, four at a time.
 inline Lanes angle_of(const Lanes& x, const Lanes& y) {
     using Bits = std::int32_t __attribute__((vector_size(16)));
     constexpr float kPi = std::numbers::pi_v<float>;

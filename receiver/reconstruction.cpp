@@ -24,6 +24,7 @@
 #include "receiver/shrink_wrap.hpp"
 #include "receiver/surface_distance.hpp"
 #include "receiver/surface_mesh.hpp"
+#include "receiver/surface_smoothing.hpp"
 #include "receiver/vertex_insertion.hpp"
 #include "receiver/vertex_removal.hpp"
 
@@ -139,9 +140,10 @@ class Pipeline {
 
     void settle_with(const std::vector<bool>& needed) {
         stage("remove");
-        remove_vertices(surface_.mesh, [&](VertexId v) {
+        const auto removable = [&](VertexId v) {
             return surface_.point_of_vertex[v] == kNone && !needed[v];
-        });
+        };
+        remove_vertices(surface_.mesh, removable, options_.threads);
         stage("shift");
         shift_to_points(surface_, points_);
         stage("flip");
@@ -207,24 +209,21 @@ class Pipeline {
     void smooth(std::span<const char> settled) {
         const common::DiagonalWeights weights =
             common::diagonal_weights(object_.hint.diagonals, has_normals(), loss());
-        flip_to_smooth(surface_.mesh, {.weights = {.angle = weights.angle},
-                                       .settled = settled,
-                                       .fixed = &fixed_,
-                                       .pairs = false,
-                                       .threads = options_.threads});
+        SurfaceSmoother smoother(surface_.mesh, options_.threads);
+        smoother.smooth({.weights = {.angle = weights.angle},
+                         .settled = settled,
+                         .fixed = &fixed_,
+                         .pairs = false});
         const std::vector<Vector3d> normals = guiding_normals();
-        FlipCriterion criterion{.normals = normals,
-                                .weights = weights,
-                                .settled = settled,
-                                .fixed = &fixed_,
-                                .threads = options_.threads};
-        flip_to_smooth(surface_.mesh, criterion);
+        FlipCriterion criterion{
+            .normals = normals, .weights = weights, .settled = settled, .fixed = &fixed_};
+        smoother.smooth(criterion);
         if (!(weights.mark > common::kLeastDiagonalGain)) return;
         // Marks tell what the rule gets wrong of a mesh that is right otherwise; before it is
         // nearly so, they lead astray.
         const std::vector<char> marks = marked_vertices();
         criterion.marks = marks;
-        flip_to_smooth(surface_.mesh, criterion);
+        smoother.smooth_marked(criterion);
     }
 
     // Per vertex slot. Requires tags.
@@ -291,27 +290,36 @@ class Pipeline {
         return normals;
     }
 
+    // Requires tags.
+    [[nodiscard]] Vector3d tag_of(std::uint32_t point) const {
+        return common::decode_normal(object_.vertices[point].normal,
+                                     object_.hint.format.normal_bits);
+    }
+
     // Of the vertex that stands for `point`: its tag, turned towards the surface's own `estimate`
     // by at most `doubt` radians; the estimate itself where there is no tag.
     [[nodiscard]] Vector3d normal_at(std::uint32_t point, const Vector3d& estimate,
                                      double doubt) const {
         if (point == kNone || !has_normals()) return estimate;
-        const Vector3d tag =
-            common::decode_normal(object_.vertices[point].normal, object_.hint.format.normal_bits);
+        const Vector3d tag = tag_of(point);
         const double angle = std::atan2(tag.cross(estimate).norm(), tag.dot(estimate));
         if (angle <= doubt) return estimate;
         const double f = doubt / angle;
         return (std::sin((1 - f) * angle) * tag + std::sin(f * angle) * estimate).normalized();
     }
 
+    // Per vertex slot: tags, and the surface's own estimates where there are none.
     [[nodiscard]] std::vector<Vector3d> guiding_normals() const {
-        std::vector<VertexId> slots;
-        const std::vector<Vector3d> estimates =
-            common::vertex_normals(surface_.mesh.extract(&slots));
         std::vector<Vector3d> normals(surface_.mesh.vertex_slots(), Vector3d::Zero());
-        for (std::size_t i = 0; i < slots.size(); ++i) {
-            normals[slots[i]] = normal_at(surface_.point_of_vertex[slots[i]], estimates[i], 0.0);
-        }
+        common::parallel_for(
+            normals.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+                for (auto v = static_cast<VertexId>(begin); v < end; ++v) {
+                    if (!surface_.mesh.vertex_alive(v)) continue;
+                    const std::uint32_t point = surface_.point_of_vertex[v];
+                    normals[v] = point != kNone && has_normals() ? tag_of(point)
+                                                                 : vertex_normal(surface_.mesh, v);
+                }
+            });
         return normals;
     }
 

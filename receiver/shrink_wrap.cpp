@@ -58,7 +58,11 @@ void find_places(const SurfaceMesh& surface, const common::TriangleMesh& mesh,
                  std::vector<Pull>& pulls) {
     if (first) {
         visit_closest_triangles(
-            mesh, points, threads, [&](std::size_t i, const common::TriangleTree::Hit& hit) {
+            mesh, points, threads,
+            [&](std::uint32_t face, const Vector3d& x) {
+                return walk_to_closest(surface, face, x).squared_distance;
+            },
+            [&](std::size_t i, const common::TriangleTree::Hit& hit) {
                 pulls[i] = {hit.triangle, hit.barycentric, points[i] - hit.point};
             });
         return;

@@ -18,7 +18,8 @@ std::vector<double> distance_along_edges(const SurfaceMesh& mesh, std::span<cons
         front.emplace(0.0, v);
     }
     while (!front.empty()) {
-        const auto [d, v] = front.top();
+        const double d = front.top().first;
+        const VertexId v = front.top().second;
         front.pop();
         if (d > distance[v]) continue;  // a shorter way was found meanwhile
         mesh.for_each_outgoing(v, [&](HalfedgeId h) {

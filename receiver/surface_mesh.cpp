@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cassert>
+#include <numeric>
 #include <span>
 #include <tuple>
 #include <utility>
+
+#include "common/parallel.hpp"
 
 namespace ellicast::receiver {
 
@@ -71,7 +74,7 @@ void SurfaceMesh::reserve(std::size_t more_vertices) {
     positions_.reserve(positions_.size() + more_vertices);
     outgoing_.reserve(outgoing_.size() + more_vertices);
     const std::size_t more_faces =
-        2 * more_vertices - std::min(2 * more_vertices, free_faces_.size());
+        2 * more_vertices - std::min(2 * more_vertices, slots_.faces.size());
     corners_.reserve(corners_.size() + 3 * more_faces);
     twins_.reserve(twins_.size() + 3 * more_faces);
 }
@@ -92,15 +95,64 @@ bool SurfaceMesh::adjacent(VertexId a, VertexId b) const {
     return false;
 }
 
-FaceId SurfaceMesh::new_face() {
-    if (!free_faces_.empty()) {
-        const FaceId f = free_faces_.back();
-        free_faces_.pop_back();
-        return f;
+SurfaceMesh::Slots SurfaceMesh::take_slots(std::size_t vertices) {
+    Slots slots;
+    const auto take = [](std::vector<std::uint32_t>& from, std::size_t count,
+                         std::vector<std::uint32_t>& to) {
+        const std::size_t taken = std::min(count, from.size());
+        to.assign(from.end() - static_cast<std::ptrdiff_t>(taken), from.end());
+        from.resize(from.size() - taken);
+        return count - taken;
+    };
+    // New ones before those that were there, so that they come last.
+    const auto add = [](std::size_t first, std::size_t count, std::vector<std::uint32_t>& to) {
+        to.insert(to.begin(), count, 0);
+        std::iota(to.rend() - static_cast<std::ptrdiff_t>(count), to.rend(),
+                  static_cast<std::uint32_t>(first));
+    };
+    const std::size_t new_vertices = take(slots_.vertices, vertices, slots.vertices);
+    add(positions_.size(), new_vertices, slots.vertices);
+    const std::size_t new_faces = take(slots_.faces, 2 * vertices, slots.faces);
+    add(face_slots(), new_faces, slots.faces);
+    positions_.resize(positions_.size() + new_vertices, Eigen::Vector3d::Zero());
+    outgoing_.resize(positions_.size(), kNone);
+    corners_.resize(corners_.size() + 3 * new_faces, kNone);
+    twins_.resize(corners_.size(), kNone);
+    return slots;
+}
+
+void SurfaceMesh::give_back(Slots slots) {
+    live_vertices_ += static_cast<std::size_t>(slots.vertices_gained);
+    slots_.vertices.insert(slots_.vertices.end(), slots.vertices.begin(), slots.vertices.end());
+    slots_.faces.insert(slots_.faces.end(), slots.faces.begin(), slots.faces.end());
+}
+
+void SurfaceMesh::grow() {
+    if (slots_.vertices.empty()) {
+        slots_.vertices.push_back(static_cast<VertexId>(positions_.size()));
+        positions_.push_back(Eigen::Vector3d::Zero());
+        outgoing_.push_back(kNone);
     }
-    const auto f = static_cast<FaceId>(face_slots());
-    corners_.insert(corners_.end(), 3, kNone);
-    twins_.insert(twins_.end(), 3, kNone);
+    while (slots_.faces.size() < 2) {
+        slots_.faces.insert(slots_.faces.begin(), static_cast<FaceId>(face_slots()));
+        corners_.insert(corners_.end(), 3, kNone);
+        twins_.insert(twins_.end(), 3, kNone);
+    }
+}
+
+VertexId SurfaceMesh::new_vertex(const Eigen::Vector3d& p, Slots& slots) {
+    assert(!slots.vertices.empty());
+    const VertexId v = slots.vertices.back();
+    slots.vertices.pop_back();
+    positions_[v] = p;
+    ++slots.vertices_gained;
+    return v;
+}
+
+FaceId SurfaceMesh::new_face(Slots& slots) {
+    assert(!slots.faces.empty());
+    const FaceId f = slots.faces.back();
+    slots.faces.pop_back();
     return f;
 }
 
@@ -114,17 +166,14 @@ void SurfaceMesh::set_face(FaceId f, VertexId a, VertexId b, VertexId c) {
     outgoing_[c] = h + 2;
 }
 
-VertexId SurfaceMesh::split_face(FaceId f, const Eigen::Vector3d& p) {
+VertexId SurfaceMesh::split_face(FaceId f, const Eigen::Vector3d& p, Slots& slots) {
     assert(face_alive(f));
-    const auto v = static_cast<VertexId>(positions_.size());
-    positions_.push_back(p);
-    outgoing_.push_back(kNone);
-    ++live_vertices_;
+    const VertexId v = new_vertex(p, slots);
     const auto [a, b, c] = face(f);
     const HalfedgeId twin_bc = twins_[halfedge(f, 1)];
     const HalfedgeId twin_ca = twins_[halfedge(f, 2)];
-    const FaceId g = new_face();
-    const FaceId k = new_face();
+    const FaceId g = new_face(slots);
+    const FaceId k = new_face(slots);
     // f = (a, b, v), g = (b, c, v), k = (c, a, v); the half-edge (a, b) of f keeps its twin.
     set_face(f, a, b, v);
     set_face(g, b, c, v);
@@ -137,7 +186,7 @@ VertexId SurfaceMesh::split_face(FaceId f, const Eigen::Vector3d& p) {
     return v;
 }
 
-VertexId SurfaceMesh::split_edge(HalfedgeId h, const Eigen::Vector3d& p) {
+VertexId SurfaceMesh::split_edge(HalfedgeId h, const Eigen::Vector3d& p, Slots& slots) {
     const HalfedgeId t = twins_[h];
     const FaceId f = face_of(h);
     const FaceId g = face_of(t);
@@ -149,12 +198,9 @@ VertexId SurfaceMesh::split_edge(HalfedgeId h, const Eigen::Vector3d& p) {
     const HalfedgeId twin_ca = twins_[prev(h)];
     const HalfedgeId twin_ad = twins_[next(t)];
     const HalfedgeId twin_db = twins_[prev(t)];
-    const auto v = static_cast<VertexId>(positions_.size());
-    positions_.push_back(p);
-    outgoing_.push_back(kNone);
-    ++live_vertices_;
-    const FaceId m = new_face();
-    const FaceId n = new_face();
+    const VertexId v = new_vertex(p, slots);
+    const FaceId m = new_face(slots);
+    const FaceId n = new_face(slots);
     // f = (v, c, a), m = (v, b, c), g = (v, d, b), n = (v, a, d)
     set_face(f, v, c, a);
     set_face(m, v, b, c);
@@ -210,7 +256,7 @@ void SurfaceMesh::flip(HalfedgeId h) {
 }
 
 bool SurfaceMesh::can_collapse(HalfedgeId h) const {
-    if (live_vertices_ <= 4) return false;
+    if (live_vertices() <= 4) return false;
     const VertexId a = from_vertex(h);
     const VertexId b = to_vertex(h);
     const VertexId c = opposite(h);
@@ -230,7 +276,7 @@ bool SurfaceMesh::can_collapse(HalfedgeId h) const {
     return ok && common == 2 && valence(c) > 3 && valence(d) > 3;
 }
 
-void SurfaceMesh::collapse(HalfedgeId h) {
+void SurfaceMesh::collapse(HalfedgeId h, Slots& slots) {
     const HalfedgeId t = twins_[h];
     const VertexId a = from_vertex(h);
     const VertexId b = to_vertex(h);
@@ -258,9 +304,9 @@ void SurfaceMesh::collapse(HalfedgeId h) {
     outgoing_[a] = kNone;
     for (const FaceId dead : {f, g}) {
         for (unsigned corner = 0; corner < 3; ++corner) corners_[halfedge(dead, corner)] = kNone;
-        free_faces_.push_back(dead);
+        slots.faces.push_back(dead);
     }
-    --live_vertices_;
+    --slots.vertices_gained;
 }
 
 Eigen::Vector3d SurfaceMesh::area_normal(FaceId f) const {
@@ -271,11 +317,11 @@ Eigen::Vector3d SurfaceMesh::area_normal(FaceId f) const {
 common::TriangleMesh SurfaceMesh::extract(std::vector<VertexId>* vertex_of) const {
     common::TriangleMesh mesh;
     std::vector<std::uint32_t> number(positions_.size(), kNone);
-    mesh.positions.reserve(live_vertices_);
-    mesh.triangles.reserve(face_slots() - free_faces_.size());
+    mesh.positions.reserve(live_vertices());
+    mesh.triangles.reserve(face_slots() - slots_.faces.size());
     if (vertex_of) {
         vertex_of->clear();
-        vertex_of->reserve(live_vertices_);
+        vertex_of->reserve(live_vertices());
     }
     for (VertexId v = 0; v < positions_.size(); ++v) {
         if (!vertex_alive(v)) continue;
@@ -322,15 +368,45 @@ std::string SurfaceMesh::validate() const {
     return "";
 }
 
-double mean_edge_length(const SurfaceMesh& mesh) {
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (HalfedgeId h = 0; h < 3 * mesh.face_slots(); ++h) {
-        if (!mesh.face_alive(SurfaceMesh::face_of(h))) continue;
-        sum += (mesh.position(mesh.from_vertex(h)) - mesh.position(mesh.to_vertex(h))).norm();
-        ++count;
+Eigen::Vector3d vertex_normal(const SurfaceMesh& mesh, VertexId v) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    const Eigen::Vector3d& p = mesh.position(v);
+    mesh.for_each_outgoing(v, [&](HalfedgeId h) {
+        const Eigen::Vector3d a = mesh.position(mesh.to_vertex(h)) - p;
+        const Eigen::Vector3d b = mesh.position(mesh.opposite(h)) - p;
+        const double weight = a.squaredNorm() * b.squaredNorm();
+        if (weight > 0.0) sum += a.cross(b) / weight;
+    });
+    return sum.normalized();
+}
+
+double mean_edge_length(const SurfaceMesh& mesh, unsigned threads) {
+    constexpr std::size_t kPart = 1 << 16;  // of which a sum is made, whoever makes it
+    struct Part {
+        double sum = 0.0;
+        std::size_t edges = 0;
+    };
+    std::vector<Part> parts((mesh.face_slots() + kPart - 1) / kPart);
+    common::parallel_for(parts.size(), threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t part = begin; part < end; ++part) {
+            const std::size_t last = std::min(mesh.face_slots(), (part + 1) * kPart);
+            for (auto f = static_cast<FaceId>(part * kPart); f < last; ++f) {
+                if (!mesh.face_alive(f)) continue;
+                const auto [a, b, c] = mesh.face(f);
+                const Eigen::Vector3d& p = mesh.position(a);
+                const Eigen::Vector3d& q = mesh.position(b);
+                const Eigen::Vector3d& r = mesh.position(c);
+                parts[part].sum += (p - q).norm() + (q - r).norm() + (r - p).norm();
+                parts[part].edges += 3;
+            }
+        }
+    });
+    Part all;
+    for (const Part& part : parts) {
+        all.sum += part.sum;
+        all.edges += part.edges;
     }
-    return count == 0 ? 0.0 : sum / static_cast<double>(count);
+    return all.edges == 0 ? 0.0 : all.sum / static_cast<double>(all.edges);
 }
 
 }  // namespace ellicast::receiver

@@ -35,6 +35,18 @@ class SurfaceMesh {
     /// Room for so many more vertices and their faces, so that no array is moved meanwhile.
     void reserve(std::size_t more_vertices);
 
+    /// Slots without a vertex or face. Threads that work on different parts of the mesh
+    /// (MeshRegions) take new ones from their own and leave there what they remove.
+    struct Slots {
+        std::vector<VertexId> vertices;      // the next is the last
+        std::vector<FaceId> faces;           // likewise
+        std::ptrdiff_t vertices_gained = 0;  // by surgery with these
+    };
+    /// New slots for so many vertices and their faces.
+    [[nodiscard]] Slots take_slots(std::size_t vertices);
+    /// What is left of them is the mesh's again.
+    void give_back(Slots slots);
+
     [[nodiscard]] std::size_t vertex_slots() const { return positions_.size(); }
     [[nodiscard]] std::size_t face_slots() const { return corners_.size() / 3; }
     [[nodiscard]] bool vertex_alive(VertexId v) const { return outgoing_[v] != kNone; }
@@ -73,9 +85,18 @@ class SurfaceMesh {
     [[nodiscard]] bool adjacent(VertexId a, VertexId b) const;
 
     /// 1-to-3 split: a new vertex at p inside f. f stays one of the three.
-    VertexId split_face(FaceId f, const Eigen::Vector3d& p);
+    VertexId split_face(FaceId f, const Eigen::Vector3d& p) {
+        grow();
+        return split_face(f, p, slots_);
+    }
     /// 2-to-4 split: a new vertex at p on h's edge. Both old faces stay among the four.
-    VertexId split_edge(HalfedgeId h, const Eigen::Vector3d& p);
+    VertexId split_edge(HalfedgeId h, const Eigen::Vector3d& p) {
+        grow();
+        return split_edge(h, p, slots_);
+    }
+    /// The same with slots of one's own, which must suffice.
+    VertexId split_face(FaceId f, const Eigen::Vector3d& p, Slots& slots);
+    VertexId split_edge(HalfedgeId h, const Eigen::Vector3d& p, Slots& slots);
 
     /// False when the flipped edge exists already or an end would be left with valence below 3.
     [[nodiscard]] bool can_flip(HalfedgeId h) const;
@@ -87,7 +108,8 @@ class SurfaceMesh {
     /// vertices.
     [[nodiscard]] bool can_collapse(HalfedgeId h) const;
     /// Removes h's start vertex and two faces.
-    void collapse(HalfedgeId h);
+    void collapse(HalfedgeId h) { collapse(h, slots_); }
+    void collapse(HalfedgeId h, Slots& slots);
 
     /// Twice the area times the unit normal.
     [[nodiscard]] Eigen::Vector3d area_normal(FaceId f) const;
@@ -101,7 +123,10 @@ class SurfaceMesh {
   private:
     /// Sets the twins; false when an edge has not two half-edges of opposite directions.
     bool pair_halfedges();
-    FaceId new_face();
+    /// Slots for one vertex and two faces more, where the mesh's own do not suffice.
+    void grow();
+    VertexId new_vertex(const Eigen::Vector3d& p, Slots& slots);
+    static FaceId new_face(Slots& slots);
     void set_face(FaceId f, VertexId a, VertexId b, VertexId c);
     void link(HalfedgeId a, HalfedgeId b) {
         twins_[a] = b;
@@ -112,11 +137,19 @@ class SurfaceMesh {
     std::vector<VertexId> corners_;     // 3 per face; kNone in dead faces
     std::vector<HalfedgeId> twins_;     // 3 per face
     std::vector<HalfedgeId> outgoing_;  // per vertex; kNone when dead
-    std::vector<FaceId> free_faces_;
-    std::size_t live_vertices_ = 0;
+    [[nodiscard]] std::size_t live_vertices() const {
+        return live_vertices_ + static_cast<std::size_t>(slots_.vertices_gained);
+    }
+    Slots slots_;
+    std::size_t live_vertices_ = 0;  // but for what slots_ gained
 };
 
-/// Mean over all live faces' edges; 0 without any. Linear.
-double mean_edge_length(const SurfaceMesh& mesh);
+/// Unit normal at a live vertex: of its faces, each by its angle and sides as in
+/// common::vertex_normals.
+Eigen::Vector3d vertex_normal(const SurfaceMesh& mesh, VertexId v);
+
+/// Mean over all live faces' edges; 0 without any. Linear, on `threads` threads (0: one per core),
+/// which do not change the result.
+double mean_edge_length(const SurfaceMesh& mesh, unsigned threads = 1);
 
 }  // namespace ellicast::receiver

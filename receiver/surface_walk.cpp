@@ -38,6 +38,21 @@ SurfacePlace best_beyond_edges(const SurfaceMesh& mesh, const SurfacePlace& plac
     return best;
 }
 
+// The best place, if all faces on the way may be left.
+template <class MayLeave>
+std::optional<SurfacePlace> walk(const SurfaceMesh& mesh, FaceId start, const Vector3d& x,
+                                 const MayLeave& may_leave) {
+    SurfacePlace best = place_on_face(mesh, start, x);
+    for (int step = 0; step < kMaxWalk; ++step) {
+        if (!may_leave(best.face)) return std::nullopt;
+        SurfacePlace next = best_beyond_edges(mesh, best, x);
+        if (next.face == best.face) next = best_around_corner(mesh, best, x);
+        if (next.face == best.face) break;
+        best = next;
+    }
+    return best;
+}
+
 }  // namespace
 
 SurfacePlace place_on_face(const SurfaceMesh& mesh, FaceId face, const Vector3d& x) {
@@ -48,14 +63,14 @@ SurfacePlace place_on_face(const SurfaceMesh& mesh, FaceId face, const Vector3d&
 }
 
 SurfacePlace walk_to_closest(const SurfaceMesh& mesh, FaceId start, const Vector3d& x) {
-    SurfacePlace best = place_on_face(mesh, start, x);
-    for (int step = 0; step < kMaxWalk; ++step) {
-        SurfacePlace next = best_beyond_edges(mesh, best, x);
-        if (next.face == best.face) next = best_around_corner(mesh, best, x);
-        if (next.face == best.face) break;
-        best = next;
-    }
-    return best;
+    return *walk(mesh, start, x, [](FaceId) { return true; });
+}
+
+std::optional<SurfacePlace> walk_to_closest(const SurfaceMesh& mesh, FaceId start,
+                                            const Vector3d& x, const MeshRegions& regions) {
+    const auto may_leave = [&](FaceId f) { return regions.inner(f); };
+    const std::optional<SurfacePlace> place = walk(mesh, start, x, may_leave);
+    return place && may_leave(place->face) ? place : std::nullopt;
 }
 
 }  // namespace ellicast::receiver

@@ -3,7 +3,9 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 
+#include "receiver/mesh_regions.hpp"
 #include "receiver/surface_mesh.hpp"
 
 namespace ellicast::receiver {
@@ -24,5 +26,10 @@ SurfacePlace place_on_face(const SurfaceMesh& mesh, FaceId face, const Eigen::Ve
 /// among its neighbours, and of all when the start is near it. Cost: about three faces a step; 150
 /// ns where the start is the goal.
 SurfacePlace walk_to_closest(const SurfaceMesh& mesh, FaceId start, const Eigen::Vector3d& x);
+
+/// The same within a region of `regions`, while others are at work; empty where the walk comes to a
+/// face at a border.
+std::optional<SurfacePlace> walk_to_closest(const SurfaceMesh& mesh, FaceId start,
+                                            const Eigen::Vector3d& x, const MeshRegions& regions);
 
 }  // namespace ellicast::receiver

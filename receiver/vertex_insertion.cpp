@@ -2,10 +2,13 @@
 #include "receiver/vertex_insertion.hpp"
 
 #include <algorithm>
-#include <tuple>
+#include <numeric>
+#include <optional>
+#include <utility>
 
 #include "receiver/closest_triangles.hpp"
 #include "receiver/edge_flips.hpp"
+#include "receiver/mesh_regions.hpp"
 #include "receiver/surface_walk.hpp"
 
 namespace ellicast::receiver {
@@ -19,6 +22,9 @@ constexpr double kEdgeCoordinate = 0.02;
 // Above this one the projection is as good as the corner.
 constexpr double kCornerCoordinate = 0.9;
 constexpr double kSamePointCoordinate = 0.999;
+// Fewer points go in before regions for them are found.
+constexpr std::size_t kWorthRegions = 4096;
+
 struct Target {
     std::uint32_t point;
     FaceId face;  // of the surface at entry
@@ -29,6 +35,7 @@ std::vector<Target> project(const PointSurface& surface, std::span<const Vector3
                             std::span<const std::uint32_t> chosen, unsigned threads) {
     // The extracted mesh numbers live faces; `slot` leads back.
     std::vector<FaceId> slot;
+    slot.reserve(surface.mesh.face_slots());
     for (FaceId f = 0; f < surface.mesh.face_slots(); ++f) {
         if (surface.mesh.face_alive(f)) slot.push_back(f);
     }
@@ -36,47 +43,82 @@ std::vector<Target> project(const PointSurface& surface, std::span<const Vector3
     std::transform(chosen.begin(), chosen.end(), positions.begin(),
                    [&](std::uint32_t point) { return points[point]; });
     std::vector<Target> targets(chosen.size());
-    visit_closest_triangles(surface.mesh.extract(), positions, threads,
-                            [&](std::size_t i, const common::TriangleTree::Hit& hit) {
-                                targets[i] = {chosen[i], slot[hit.triangle], hit.point};
-                            });
+    visit_closest_triangles(
+        surface.mesh.extract(), positions, threads,
+        [&](std::uint32_t triangle, const Vector3d& x) {
+            return walk_to_closest(surface.mesh, slot[triangle], x).squared_distance;
+        },
+        [&](std::size_t i, const common::TriangleTree::Hit& hit) {
+            targets[i] = {chosen[i], slot[hit.triangle], hit.point};
+        });
     return targets;
 }
 
+// Where points go in. While several threads do that, each has a region, slots of its own, and puts
+// off what comes too near to another region.
 class Inserter {
   public:
     explicit Inserter(PointSurface& surface) : surface_(surface), mesh_(surface.mesh) {}
+    Inserter(PointSurface& surface, const MeshRegions& regions, SurfaceMesh::Slots slots)
+        : surface_(surface), mesh_(surface.mesh), regions_(&regions), slots_(std::move(slots)) {}
 
-    // True when the point is a vertex now.
-    bool insert(const Target& target) {
-        const SurfacePlace place = walk_to_closest(mesh_, target.face, target.at);
-        const auto corners = mesh_.face(place.face);
+    void insert(const Target& target) {
+        const std::optional<SurfacePlace> place = find(target);
+        if (!place) {
+            put_off_.push_back(target);
+            return;
+        }
+        const auto corners = mesh_.face(place->face);
         int largest = 0;
-        place.barycentric.maxCoeff(&largest);
-        const double top = place.barycentric[largest];
+        place->barycentric.maxCoeff(&largest);
+        const double top = place->barycentric[largest];
         const VertexId corner = corners[static_cast<std::size_t>(largest)];
         const bool free_corner = surface_.point_of_vertex[corner] == kNone;
         if (free_corner && top > kCornerCoordinate && can_move(corner, target.at)) {
             mesh_.set_position(corner, target.at);
             surface_.point_of_vertex[corner] = target.point;
             flip_around(corner);
-            return true;
+        } else if (top > kSamePointCoordinate) {
+            left_out_.push_back(target.point);
+        } else {
+            split(*place, target);
         }
-        if (top > kSamePointCoordinate) return false;
-        const VertexId v = split(place, target.at);
-        surface_.point_of_vertex.push_back(target.point);
-        flip_around(v);
-        return true;
+    }
+
+    // Those that all but met an earlier one.
+    [[nodiscard]] const std::vector<std::uint32_t>& left_out() const { return left_out_; }
+    [[nodiscard]] const std::vector<Target>& put_off() const { return put_off_; }
+    // Edges that are to be looked at without regions; gives the slots back.
+    std::vector<HalfedgeId> finish() {
+        mesh_.give_back(std::move(slots_));
+        return std::move(put_off_edges_);
     }
 
   private:
-    VertexId split(const SurfacePlace& place, const Vector3d& at) {
+    [[nodiscard]] std::optional<SurfacePlace> find(const Target& target) const {
+        if (regions_ == nullptr) return walk_to_closest(mesh_, target.face, target.at);
+        return walk_to_closest(mesh_, target.face, target.at, *regions_);
+    }
+
+    void split(const SurfacePlace& place, const Target& target) {
         int smallest = 0;
+        VertexId v = kNone;
         if (place.barycentric.minCoeff(&smallest) < kEdgeCoordinate) {
             const auto corner = static_cast<unsigned>((smallest + 1) % 3);
-            return mesh_.split_edge(SurfaceMesh::halfedge(place.face, corner), at);
+            const HalfedgeId h = SurfaceMesh::halfedge(place.face, corner);
+            if (regions_ != nullptr && !is_inner(mesh_, *regions_, h)) {
+                put_off_.push_back(target);
+                return;
+            }
+            v = regions_ == nullptr ? mesh_.split_edge(h, target.at)
+                                    : mesh_.split_edge(h, target.at, slots_);
+        } else {
+            v = regions_ == nullptr ? mesh_.split_face(place.face, target.at)
+                                    : mesh_.split_face(place.face, target.at, slots_);
         }
-        return mesh_.split_face(place.face, at);
+        if (v >= surface_.point_of_vertex.size()) surface_.point_of_vertex.resize(v + 1, kNone);
+        surface_.point_of_vertex[v] = target.point;
+        flip_around(v);
     }
 
     // Moving v to p must not turn any face at v over.
@@ -97,30 +139,97 @@ class Inserter {
             queue_.push_back(SurfaceMesh::next(h));
             queue_.push_back(h);
         });
-        flip_to_delaunay(mesh_, queue_);
+        if (regions_ == nullptr) {
+            flip_to_delaunay(mesh_, queue_);
+        } else {
+            flip_to_delaunay(mesh_, queue_, *regions_, put_off_edges_);
+        }
     }
 
     PointSurface& surface_;
     SurfaceMesh& mesh_;
+    const MeshRegions* regions_ = nullptr;
+    SurfaceMesh::Slots slots_;
     std::vector<HalfedgeId> queue_;
+    std::vector<std::uint32_t> left_out_;
+    std::vector<Target> put_off_;
+    std::vector<HalfedgeId> put_off_edges_;
 };
+
+// How many targets each face slot has.
+std::vector<std::uint32_t> targets_per_face(const SurfaceMesh& mesh,
+                                            std::span<const Target> targets) {
+    std::vector<std::uint32_t> count(mesh.face_slots(), 0);
+    for (const Target& target : targets) ++count[target.face];
+    return count;
+}
+
+// Face slots run in grid order, so that neighbours in this order are neighbours on the surface.
+void sort_by_face(const SurfaceMesh& mesh, std::vector<Target>& targets) {
+    std::vector<std::uint32_t> next(mesh.face_slots() + 1, 0);
+    for (const Target& target : targets) ++next[target.face + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    std::vector<Target> sorted(targets.size());
+    for (const Target& target : targets) sorted[next[target.face]++] = target;
+    targets = std::move(sorted);
+}
+
+// Places of the targets of each region, in the order of targets.
+std::vector<std::vector<std::uint32_t>> by_region(const MeshRegions& regions,
+                                                  std::span<const Target> targets) {
+    std::vector<std::vector<std::uint32_t>> parts(regions.count());
+    for (std::uint32_t i = 0; i < targets.size(); ++i) {
+        parts[regions.region_of(targets[i].face)].push_back(i);
+    }
+    return parts;
+}
+
+// Inserts what lies well within the regions, each of which a thread has; keeps the rest in
+// `targets`.
+void insert_in_regions(PointSurface& surface, const MeshRegions& regions, unsigned threads,
+                       std::vector<Target>& targets, std::vector<std::uint32_t>& left_out) {
+    SurfaceMesh& mesh = surface.mesh;
+    const std::vector<std::vector<std::uint32_t>> parts = by_region(regions, targets);
+    std::vector<Inserter> inserters;
+    for (const std::vector<std::uint32_t>& part : parts) {
+        inserters.emplace_back(surface, regions, mesh.take_slots(part.size()));
+    }
+    surface.point_of_vertex.resize(mesh.vertex_slots(), kNone);
+    regions.for_each(threads, [&](std::size_t region) {
+        for (const std::uint32_t i : parts[region]) inserters[region].insert(targets[i]);
+    });
+    std::vector<Target> left;
+    for (Inserter& inserter : inserters) {
+        const auto& put_off = inserter.put_off();
+        left.insert(left.end(), put_off.begin(), put_off.end());
+        left_out.insert(left_out.end(), inserter.left_out().begin(), inserter.left_out().end());
+        std::vector<HalfedgeId> edges = inserter.finish();
+        flip_to_delaunay(mesh, edges);
+    }
+    targets = std::move(left);
+}
 
 }  // namespace
 
 std::vector<std::uint32_t> insert_points(PointSurface& surface, std::span<const Vector3d> points,
                                          std::span<const std::uint32_t> chosen, unsigned threads) {
-    std::vector<Target> targets = project(surface, points, chosen, threads);
-    // Face slots run in grid order, so neighbours in this order are neighbours on the surface.
-    std::sort(targets.begin(), targets.end(), [](const Target& a, const Target& b) {
-        return std::tie(a.face, a.point) < std::tie(b.face, b.point);
-    });
+    std::vector<std::uint32_t> ascending(chosen.begin(), chosen.end());
+    std::sort(ascending.begin(), ascending.end());
+    std::vector<Target> targets = project(surface, points, ascending, threads);
+    sort_by_face(surface.mesh, targets);
     surface.mesh.reserve(targets.size());
     surface.point_of_vertex.reserve(surface.point_of_vertex.size() + targets.size());
     std::vector<std::uint32_t> left_out;
-    Inserter inserter(surface);
-    for (const Target& target : targets) {
-        if (!inserter.insert(target)) left_out.push_back(target.point);
+    for (const bool shifted : {false, true}) {
+        if (targets.size() < kWorthRegions) break;
+        const MeshRegions regions(surface.mesh, shifted, threads,
+                                  targets_per_face(surface.mesh, targets));
+        if (regions.count() == 1) break;
+        insert_in_regions(surface, regions, threads, targets, left_out);
     }
+    Inserter inserter(surface);
+    for (const Target& target : targets) inserter.insert(target);
+    left_out.insert(left_out.end(), inserter.left_out().begin(), inserter.left_out().end());
     std::sort(left_out.begin(), left_out.end());
     return left_out;
 }

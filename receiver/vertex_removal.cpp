@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "receiver/edge_flips.hpp"
+#include "receiver/mesh_regions.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -21,11 +23,17 @@ struct Bounds {
 constexpr std::array<Bounds, 5> kPasses = {
     {{0.3, 0.8}, {0.1, 0.6}, {0.02, 0.3}, {1e-3, 0.0}, {-1.0, -2.0}}};
 
+// Fewer vertices are removed before regions for that are found.
+constexpr std::size_t kWorthRegions = 2048;
+
+// While several threads remove, each has a region and leaves alone what comes too near to another.
 class Remover {
   public:
     explicit Remover(SurfaceMesh& mesh) : mesh_(mesh) {}
+    Remover(SurfaceMesh& mesh, const MeshRegions& regions) : mesh_(mesh), regions_(&regions) {}
 
     bool remove(VertexId v, const Bounds& bounds) {
+        if (!may_touch(v)) return false;
         HalfedgeId best = kNone;
         double best_quality = -std::numeric_limits<double>::infinity();
         double worst_now = std::numeric_limits<double>::infinity();
@@ -42,16 +50,41 @@ class Remover {
         if (best == kNone) return false;
         ring_.clear();
         mesh_.for_each_outgoing(v, [&](HalfedgeId h) { ring_.push_back(mesh_.to_vertex(h)); });
-        mesh_.collapse(best);
+        if (regions_ == nullptr) {
+            mesh_.collapse(best);
+        } else {
+            mesh_.collapse(best, slots_);
+        }
         queue_.clear();
         for (const VertexId u : ring_) {
             mesh_.for_each_outgoing(u, [&](HalfedgeId h) { queue_.push_back(h); });
         }
-        flip_to_delaunay(mesh_, queue_);
+        if (regions_ == nullptr) {
+            flip_to_delaunay(mesh_, queue_);
+        } else {
+            flip_to_delaunay(mesh_, queue_, *regions_, put_off_);
+        }
         return true;
     }
 
+    // Edges that are to be looked at without regions; gives slots back.
+    std::vector<HalfedgeId> finish() {
+        mesh_.give_back(std::move(slots_));
+        return std::move(put_off_);
+    }
+
   private:
+    // Its ring and all faces around that are those of one region.
+    [[nodiscard]] bool may_touch(VertexId v) const {
+        if (regions_ == nullptr) return true;
+        // Where v is at a border itself, its fan is not to be walked around.
+        bool may = regions_->inner(SurfaceMesh::face_of(mesh_.outgoing(v)));
+        if (!may) return false;
+        mesh_.for_each_outgoing(
+            v, [&](HalfedgeId h) { may = may && regions_->inner(SurfaceMesh::face_of(h)); });
+        return may;
+    }
+
     [[nodiscard]] double quality(HalfedgeId h) const {
         return triangle_quality(mesh_.position(mesh_.from_vertex(h)),
                                 mesh_.position(mesh_.to_vertex(h)),
@@ -82,16 +115,47 @@ class Remover {
     }
 
     SurfaceMesh& mesh_;
+    const MeshRegions* regions_ = nullptr;
+    SurfaceMesh::Slots slots_;
     std::vector<VertexId> ring_;
     std::vector<HalfedgeId> queue_;
+    std::vector<HalfedgeId> put_off_;
 };
+
+// Removes those that the bounds allow and that lie well within a region.
+void remove_in_regions(SurfaceMesh& mesh, const MeshRegions& regions, unsigned threads,
+                       const Bounds& bounds, std::vector<VertexId>& left) {
+    std::vector<std::vector<VertexId>> parts(regions.count());
+    for (const VertexId v : left) {
+        parts[regions.region_of(SurfaceMesh::face_of(mesh.outgoing(v)))].push_back(v);
+    }
+    std::vector<Remover> removers(regions.count(), Remover(mesh, regions));
+    regions.for_each(threads, [&](std::size_t region) {
+        for (const VertexId v : parts[region]) removers[region].remove(v, bounds);
+    });
+    for (Remover& remover : removers) {
+        std::vector<HalfedgeId> edges = remover.finish();
+        std::erase_if(edges, [&](HalfedgeId h) {  // gone with a later vertex
+            return !mesh.face_alive(SurfaceMesh::face_of(h));
+        });
+        flip_to_delaunay(mesh, edges);
+    }
+    std::erase_if(left, [&](VertexId v) { return !mesh.vertex_alive(v); });
+}
 
 }  // namespace
 
-std::size_t remove_vertices(SurfaceMesh& mesh, const std::function<bool(VertexId)>& removable) {
+std::size_t remove_vertices(SurfaceMesh& mesh, const std::function<bool(VertexId)>& removable,
+                            unsigned threads) {
     std::vector<VertexId> left;
     for (VertexId v = 0; v < mesh.vertex_slots(); ++v) {
         if (mesh.vertex_alive(v) && removable(v)) left.push_back(v);
+    }
+    for (const bool shifted : {false, true}) {
+        if (left.size() < kWorthRegions) break;
+        const MeshRegions regions(mesh, shifted, threads);
+        if (regions.count() == 1) break;
+        remove_in_regions(mesh, regions, threads, kPasses[0], left);
     }
     Remover remover(mesh);
     for (const Bounds& bounds : kPasses) {

@@ -14,7 +14,9 @@ namespace ellicast::receiver {
 /// bounds are relaxed pass by pass, so that easy vertices go first and no vertex is forced while a
 /// gentle way is open. In the last pass only topology counts. `removable(v)` is asked once per
 /// vertex slot. Topology never changes; a vertex that no legal collapse removes stays. Returns how
-/// many are left of the removable ones. Cost: proportional to what is removed.
-std::size_t remove_vertices(SurfaceMesh& mesh, const std::function<bool(VertexId)>& removable);
+/// many are left of the removable ones. On `threads` threads (0: one per core), which do not change
+/// the result. Cost: proportional to what is removed.
+std::size_t remove_vertices(SurfaceMesh& mesh, const std::function<bool(VertexId)>& removable,
+                            unsigned threads = 1);
 
 }  // namespace ellicast::receiver

@@ -20,6 +20,7 @@
 #include "common/self_intersection.hpp"
 #include "common/triangle_intersection.hpp"
 #include "receiver/edge_flips.hpp"
+#include "receiver/surface_smoothing.hpp"
 #include "receiver/vertex_insertion.hpp"
 #include "sender/surface_decimation.hpp"
 #include "tests/support/large_model.hpp"

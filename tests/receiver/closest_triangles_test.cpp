@@ -25,11 +25,15 @@ TEST_CASE("every point is told its closest triangle once, on any number of threa
     for (const unsigned threads : {1U, 3U}) {
         std::vector<int> visits(points.size(), 0);
         std::vector<common::TriangleTree::Hit> hits(points.size());
-        visit_closest_triangles(mesh, points, threads,
-                                [&](std::size_t i, const common::TriangleTree::Hit& hit) {
-                                    ++visits[i];
-                                    hits[i] = hit;
-                                });
+        visit_closest_triangles(
+            mesh, points, threads,
+            [&](std::uint32_t last, const Vector3d& x) {
+                return squared_distance_to(mesh, last, x);
+            },
+            [&](std::size_t i, const common::TriangleTree::Hit& hit) {
+                ++visits[i];
+                hits[i] = hit;
+            });
         for (std::size_t i = 0; i < points.size(); ++i) {
             const common::TriangleTree::Hit expected = tree.closest(points[i]);
             REQUIRE(visits[i] == 1);

@@ -10,6 +10,7 @@
 
 #include "common/random.hpp"
 #include "receiver/edge_flips.hpp"
+#include "receiver/surface_smoothing.hpp"
 #include "tests/support/meshes.hpp"
 
 namespace ellicast::receiver {

@@ -1,5 +1,6 @@
 // tests/receiver/edge_flips_test.cpp
 #include "receiver/edge_flips.hpp"
+#include "receiver/surface_smoothing.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -157,18 +158,36 @@ TEST_CASE("smoothing flips lower what they minimise, and hardly find more the se
 
 TEST_CASE("threads do not change what is flipped") {
     std::vector<std::vector<common::Triangle>> results;
+    // One region, and some.
+    const int around = GENERATE(30, 240);
     for (const unsigned threads : {1U, 3U}) {
-        SurfaceMesh mesh = *SurfaceMesh::from(tests::torus(1.0, 0.4, 30, 40));
+        SurfaceMesh mesh = *SurfaceMesh::from(tests::torus(1.0, 0.4, around, 120));
         common::Random random(4);
-        for (int n = 0; n < 500; ++n) {
+        for (int n = 0; n < 20 * around; ++n) {
             const auto h = static_cast<HalfedgeId>(random.below(3 * mesh.face_slots()));
             if (mesh.can_flip(h)) mesh.flip(h);
         }
+        SurfaceMesh delaunay = mesh;
         REQUIRE(flip_to_smooth(mesh, {.threads = threads}) > 100);
-        flip_all_to_delaunay(mesh, threads);
+        REQUIRE(mesh.validate().empty());
         results.push_back(mesh.extract().triangles);
+        REQUIRE(flip_all_to_delaunay(delaunay, threads) > 100);
+        REQUIRE(delaunay.validate().empty());
+        results.push_back(delaunay.extract().triangles);
     }
-    REQUIRE(results[0] == results[1]);
+    REQUIRE(results[0] == results[2]);
+    REQUIRE(results[1] == results[3]);
+}
+
+TEST_CASE("nothing is left to flip where regions meet") {
+    SurfaceMesh mesh = *SurfaceMesh::from(tests::torus(1.0, 0.4, 240, 120));
+    const std::size_t broken = flip_at_random(mesh, 5, 20'000);
+    REQUIRE(broken > 5'000);
+    SurfaceMesh smooth = mesh;
+    REQUIRE(flip_all_to_delaunay(mesh, 2) > 3'000);
+    REQUIRE(flip_all_to_delaunay(mesh, 2) == 0);
+    const std::size_t flips = flip_to_smooth(smooth, {}, 50);
+    REQUIRE(flip_to_smooth(smooth, {}, 50) * 50 < flips);
 }
 
 }  // namespace

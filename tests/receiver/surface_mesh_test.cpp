@@ -86,6 +86,25 @@ TEST_CASE("a tetrahedron can neither be flipped nor collapsed") {
     }
 }
 
+TEST_CASE("slots that one takes are used, and what is left of them is used later") {
+    SurfaceMesh mesh = surface(tests::cube());
+    SurfaceMesh::Slots slots = mesh.take_slots(3);
+    REQUIRE(mesh.vertex_slots() == 11);
+    REQUIRE(mesh.face_slots() == 18);
+    REQUIRE(mesh.validate().empty());
+    REQUIRE(mesh.split_face(3, {0.1, 0.2, 0.3}, slots) == 8);
+    REQUIRE(mesh.split_edge(17, {0.2, 0.2, 0.3}, slots) == 9);
+    mesh.give_back(std::move(slots));
+    REQUIRE(mesh.validate().empty());
+    REQUIRE(common::analyse_topology(mesh.extract()).vertices == 10);
+    REQUIRE(mesh.split_face(1, {0.3, 0.2, 0.3}) == 10);
+    REQUIRE(mesh.face_slots() == 18);
+    REQUIRE(mesh.split_face(1, {0.3, 0.2, 0.3}) == 11);
+    REQUIRE(mesh.face_slots() == 20);
+    REQUIRE(mesh.validate().empty());
+    REQUIRE(common::analyse_topology(mesh.extract()).faces == 20);
+}
+
 TEST_CASE("a collapse that would pinch a tube is refused") {
     // Three vertices around the tube: collapsing an edge of such a ring would pinch it.
     const SurfaceMesh mesh = surface(tests::torus(1, 0.3, 8, 3));

@@ -10,6 +10,7 @@
 #include "common/mesh_topology.hpp"
 #include "common/random.hpp"
 #include "receiver/edge_flips.hpp"
+#include "receiver/surface_smoothing.hpp"
 #include "tests/support/meshes.hpp"
 
 namespace ellicast::receiver {
@@ -109,6 +110,22 @@ TEST_CASE("the order of the chosen points and the number of threads do not matte
     REQUIRE(one.point_of_vertex == two.point_of_vertex);
     REQUIRE(one.mesh.extract().triangles == two.mesh.extract().triangles);
     REQUIRE(one.mesh.extract().positions == two.mesh.extract().positions);
+}
+
+TEST_CASE("points go in on several threads as on one, where the surface is large enough for that") {
+    const std::vector<Vector3d> points = sphere_points(60'000, 9);
+    const common::TriangleMesh base = tests::icosphere(6, 0.95);  // 81 920 faces
+    PointSurface one = start_from(base);
+    const auto left_one = insert_points(one, points, all_of(points.size()), 1);
+    REQUIRE(one.mesh.validate().empty());
+    require_each_point_once(one, points.size(), left_one);
+    PointSurface two = start_from(base);
+    REQUIRE(insert_points(two, points, all_of(points.size()), 3) == left_one);
+    REQUIRE(one.point_of_vertex == two.point_of_vertex);
+    REQUIRE(one.mesh.extract().triangles == two.mesh.extract().triangles);
+    // All edges that were put off have been looked at.
+    REQUIRE(flip_all_to_delaunay(one.mesh) * 1000 < points.size());
+    REQUIRE(common::analyse_topology(one.mesh.extract()).euler == 2);
 }
 
 TEST_CASE("far-away points leave a closed manifold") {

@@ -44,6 +44,21 @@ TEST_CASE("the removable vertices go, the others and the topology stay") {
     }
 }
 
+TEST_CASE("vertices go on several threads as on one, where the mesh is large enough for that") {
+    std::vector<common::TriangleMesh> results;
+    for (const unsigned threads : {1U, 3U}) {
+        SurfaceMesh mesh = surface(tests::torus(1.0, 0.4, 240, 120));
+        const auto removable = [](VertexId v) { return v % 3 != 0; };
+        REQUIRE(remove_vertices(mesh, removable, threads) == 0);
+        REQUIRE(mesh.validate().empty());
+        results.push_back(mesh.extract());
+        REQUIRE(results.back().positions.size() == 9'600);
+        REQUIRE(common::analyse_topology(results.back()).euler == 0);
+    }
+    REQUIRE(results[0].triangles == results[1].triangles);
+    REQUIRE(results[0].positions == results[1].positions);
+}
+
 TEST_CASE("taking the inner vertices off a box's faces leaves the box") {
     const common::TriangleMesh box = tests::box({1, 0.7, 0.5}, 6);
     SurfaceMesh mesh = surface(box);
