@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "common/fast_angle.hpp"
+
 namespace ellicast::common {
 namespace {
 
@@ -33,7 +35,7 @@ constexpr std::array<Rule, kDiagonalRules> kRules = {
 constexpr double kVerticesAround = 5.0;
 
 double angle_between(const Vector3d& n1, const Vector3d& n2) {
-    return std::atan2(n1.cross(n2).norm(), n1.dot(n2));
+    return angle_of(n1.dot(n2), n1.cross(n2).norm());
 }
 
 Vector3d normal_of(const Vector3d& a, const Vector3d& b, const Vector3d& c) {

@@ -16,7 +16,8 @@ struct Quad {
     std::array<Eigen::Vector3d, 4> vertex_normals;
 };
 
-/// Why cd might be the better diagonal. Each term is positive where it would be.
+/// Why cd might be the better diagonal. Each term is positive where it would be. Angles are those
+/// of common/fast_angle.hpp.
 struct DiagonalGain {
     /// Sum over the five edges of length x (dihedral angle), and 0.1 rad x the diagonal's own
     /// length: few and gentle creases, and the shorter diagonal where all is flat. A length.

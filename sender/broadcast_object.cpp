@@ -16,6 +16,7 @@
 #include "protocol/object_table.hpp"
 #include "sender/costly_edges.hpp"
 #include "sender/diagonal_marks.hpp"
+#include "sender/diagonal_quads.hpp"
 #include "sender/diagonal_rule.hpp"
 #include "sender/equal_positions.hpp"
 #include "sender/importance_order.hpp"
@@ -188,9 +189,22 @@ std::vector<protocol::EdgeRecord> edges_worth_telling(const PreparedModel& model
     return costly_edges(std::move(surface), vertices, options);
 }
 
+/// Sets the rule for diagonals; says which normals are to be marked, if there are tags.
+std::vector<char> set_diagonals(BroadcastObject& object, const PreparedModel& model,
+                                unsigned threads) {
+    const int normal_bits = object.hint.format.normal_bits;
+    const std::vector<Eigen::Vector3d> normals =
+        received_normals(model.solid, normal_bits, threads);
+    const Quads quads(model.solid, normals);
+    static_assert(common::kDiagonalRules == protocol::kDiagonalRules);
+    object.hint.diagonals = best_diagonal_rule(model.solid, quads, normal_bits > 0, threads);
+    if (normal_bits == 0) return {};
+    return diagonal_marks(model.solid, quads, object.hint.diagonals, threads);
+}
+
 /// Fills the object's records of vertices, and its edges. Requires format and rule for diagonals.
 void set_vertices(BroadcastObject& object, const PreparedModel& model,
-                  const ObjectOptions& options) {
+                  const std::vector<char>& marks, const ObjectOptions& options) {
     const std::vector<protocol::VertexRecord> records =
         solid_records(model, object.description.origin);
     std::vector<std::uint32_t> record_of = first_equals(records.size(), [&](std::size_t k) {
@@ -203,11 +217,6 @@ void set_vertices(BroadcastObject& object, const PreparedModel& model,
     std::vector<std::uint32_t> rank(records.size(), 0);
     for (std::uint32_t k = 0; k < vertices.size(); ++k) rank[vertices[k]] = k;
     for (std::uint32_t& v : record_of) v = rank[v];
-    std::vector<char> marks;
-    const int normal_bits = object.hint.format.normal_bits;
-    if (normal_bits > 0) {
-        marks = diagonal_marks(model.solid, normal_bits, object.hint.diagonals, options.threads);
-    }
     set_tags(object.hint.format, model, record_of, marks, object.vertices);
     if (options.tags.edges)
         object.edges = edges_worth_telling(model, record_of, object, options.threads);
@@ -261,11 +270,9 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
 
     object.order = options.order;
     object.hint.format = record_format(options.tags, model);
-    static_assert(common::kDiagonalRules == protocol::kDiagonalRules);
     object.hint.by_importance = options.order == SendingOrder::importance;
-    object.hint.diagonals =
-        best_diagonal_rule(model.solid, object.hint.format.normal_bits, options.threads);
-    set_vertices(object, model, options);
+    const std::vector<char> marks = set_diagonals(object, model, options.threads);
+    set_vertices(object, model, marks, options);
 
     object.hint.components = promise.components;
     object.hint.euler_all = promise.euler_all;

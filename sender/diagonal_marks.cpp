@@ -154,8 +154,12 @@ class Marking {
 
 std::vector<char> diagonal_marks(const TriangleMesh& solid, int normal_bits, std::uint8_t rule,
                                  unsigned threads) {
-    const std::vector<Vector3d> normals = decoded_normals(solid, normal_bits, threads);
-    const Quads quads(solid, normals);
+    const std::vector<Vector3d> normals = received_normals(solid, normal_bits, threads);
+    return diagonal_marks(solid, Quads(solid, normals), rule, threads);
+}
+
+std::vector<char> diagonal_marks(const TriangleMesh& solid, const Quads& quads, std::uint8_t rule,
+                                 unsigned threads) {
     const double weight = common::diagonal_weights(rule, true, 0.0).mark;
     const Edges edges = edges_of(solid, quads, rule, threads);
     return Marking(solid.positions.size(), quads, edges, weight).run();

@@ -8,6 +8,8 @@
 
 namespace ellicast::sender {
 
+class Quads;
+
 /// Per vertex of `solid`: 1 where its normal tag is to be marked (common/octahedral_normal.hpp). A
 /// receiver of all vertices that goes by the diagonal rule `rule` gets some diagonals wrong; it
 /// prefers one between two marked vertices (common/diagonal_choice.hpp). Marks both ends of the
@@ -17,5 +19,8 @@ namespace ellicast::sender {
 /// wrong.
 std::vector<char> diagonal_marks(const common::TriangleMesh& solid, int normal_bits,
                                  std::uint8_t rule, unsigned threads = 0);
+/// The same of the solid's quads with received_normals().
+std::vector<char> diagonal_marks(const common::TriangleMesh& solid, const Quads& quads,
+                                 std::uint8_t rule, unsigned threads);
 
 }  // namespace ellicast::sender

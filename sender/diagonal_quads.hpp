@@ -1,5 +1,5 @@
-// sender/diagonal_quads.hpp: private to sender/diagonal_rule, sender/diagonal_marks and
-// sender/costly_edges.
+// sender/diagonal_quads.hpp: private to sender/broadcast_object, sender/diagonal_rule,
+// sender/diagonal_marks and sender/costly_edges.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,6 +13,7 @@
 #include "common/octahedral_normal.hpp"
 #include "common/parallel.hpp"
 #include "common/triangle_mesh.hpp"
+#include "common/vertex_normals.hpp"
 #include "sender/edge_table.hpp"
 
 namespace ellicast::sender {
@@ -57,8 +58,16 @@ inline std::vector<HalfEdge> twins_of(const common::TriangleMesh& mesh) {
     return twins;
 }
 
+/// What a receiver of all vertices goes by: decoded tags of so many bits, or, for 0, normals of its
+/// own.
+inline std::vector<Eigen::Vector3d> received_normals(const common::TriangleMesh& mesh, int bits,
+                                                     unsigned threads) {
+    return bits > 0 ? decoded_normals(mesh, bits, threads) : common::vertex_normals(mesh);
+}
+
 /// Edges between two triangles, as quads of common/diagonal_choice.hpp. All answers are constant
-/// time, and many threads may ask.
+/// time, and many threads may ask. Takes seconds for millions of triangles; mesh and normals must
+/// outlive it. Memory: 12 bytes a triangle.
 class Quads {
   public:
     Quads(const common::TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& normals)

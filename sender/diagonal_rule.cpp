@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/diagonal_choice.hpp"
-#include "common/vertex_normals.hpp"
+#include "common/parallel.hpp"
 #include "sender/diagonal_quads.hpp"
 
 namespace ellicast::sender {
@@ -17,30 +17,46 @@ namespace {
 // than by what is left to chance in half a million of them.
 constexpr std::size_t kMostHalfEdges = 1u << 19;
 
+// Of which a sum is made, whoever makes it.
+constexpr std::size_t kPart = 1u << 13;
+
 }  // namespace
 
 std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, int normal_bits,
                                 unsigned threads) {
-    const std::vector<Eigen::Vector3d> normals = normal_bits > 0
-                                                     ? decoded_normals(solid, normal_bits, threads)
-                                                     : common::vertex_normals(solid);
+    const std::vector<Eigen::Vector3d> normals = received_normals(solid, normal_bits, threads);
+    return best_diagonal_rule(solid, Quads(solid, normals), normal_bits > 0, threads);
+}
+
+std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, const Quads& quads, bool tagged,
+                                unsigned threads) {
     const double unit = common::mean_edge_length(solid);
     std::array<common::DiagonalWeights, common::kDiagonalRules> weights;
     for (std::uint8_t rule = 0; rule < common::kDiagonalRules; ++rule) {
-        weights[rule] = common::diagonal_weights(rule, normal_bits > 0, 0.0);
+        weights[rule] = common::diagonal_weights(rule, tagged, 0.0);
     }
-    std::array<double, common::kDiagonalRules> cost{};
     const std::size_t step = std::max<std::size_t>(1, 3 * solid.triangles.size() / kMostHalfEdges);
-    const Quads quads(solid, normals);
-    for (std::size_t i = 0; i < quads.half_edges(); i += step) {
-        const auto h = static_cast<HalfEdge>(i);
-        if (!quads.has_quad(h)) continue;
-        const common::DiagonalGain gain = common::diagonal_gain(quads.quad(h));
-        const double wrong = quads.wrong_diagonal(h);
-        for (std::size_t rule = 0; rule < common::kDiagonalRules; ++rule) {
-            const double gained = gain.weighed(weights[rule].angle, weights[rule].rise, unit);
-            if (gained > common::kLeastDiagonalGain * unit) cost[rule] += wrong;
+    using Costs = std::array<double, common::kDiagonalRules>;
+    std::vector<Costs> parts((quads.half_edges() + step * kPart - 1) / (step * kPart), Costs{});
+    common::parallel_for(parts.size(), threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t part = begin; part < end; ++part) {
+            const std::size_t last = std::min(quads.half_edges(), (part + 1) * step * kPart);
+            for (std::size_t i = part * step * kPart; i < last; i += step) {
+                const auto h = static_cast<HalfEdge>(i);
+                if (!quads.has_quad(h)) continue;
+                const common::DiagonalGain gain = common::diagonal_gain(quads.quad(h));
+                const double wrong = quads.wrong_diagonal(h);
+                for (std::size_t rule = 0; rule < common::kDiagonalRules; ++rule) {
+                    const double gained =
+                        gain.weighed(weights[rule].angle, weights[rule].rise, unit);
+                    if (gained > common::kLeastDiagonalGain * unit) parts[part][rule] += wrong;
+                }
+            }
         }
+    });
+    Costs cost{};
+    for (const Costs& part : parts) {
+        for (std::size_t rule = 0; rule < cost.size(); ++rule) cost[rule] += part[rule];
     }
     return static_cast<std::uint8_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
 }

@@ -466,17 +466,17 @@ TEST_CASE("later rounds of a redundant plan copy the same vertices in other comp
     CHECK(sent_often.size() == 1);
 }
 
-TEST_CASE("laying out 2^28 vertices takes memory for datagrams, not for vertices") {
+TEST_CASE("laying out 2^26 vertices takes memory for datagrams, not for vertices") {
     LayoutSizes sizes;
     sizes.payload = 1200 - 93;
     sizes.description = 80;
     sizes.description_interval = 64;
     sizes.ellipsoids = 400;
-    sizes.vertices = 1u << 28;
+    sizes.vertices = 1u << 26;
     sizes.copies = 3;
     const RoundLayout layout = lay_out(sizes);
     CHECK(layout.first_vertex.back() == sizes.vertices);
-    CHECK(layout.datagrams() < 1.06 * static_cast<double>(1u << 28) / 91.0);
+    CHECK(layout.datagrams() < 1.06 * static_cast<double>(1u << 26) / 91.0);
     sizes.redundancy = 3.0;
     CHECK(lay_out(sizes).first_vertex.back() > 2.9 * static_cast<double>(sizes.vertices));
 }

@@ -70,6 +70,7 @@ class Pair {
         Arguments all = arguments;
         const std::vector<std::array<std::string, 2>> usual{{"--to", "127.0.0.1:" + port_},
                                                             {"--candidates", "400"},
+                                                            {"--refine", "off"},
                                                             {"--ellipsoids", "60"},
                                                             {"--cache", path("cache").string()},
                                                             {"--report", path("sent.json")}};

@@ -130,6 +130,8 @@ class SecurePair {
                               "127.0.0.1:" + std::to_string(port.value_or(port_)),
                               "--candidates",
                               "400",
+                              "--refine",
+                              "off",
                               "--ellipsoids",
                               "60",
                               "--cache",

@@ -48,7 +48,8 @@ std::size_t lines(const std::string& text) {
 
 /// Few candidates, for quick runs.
 Arguments quick(Arguments arguments) {
-    arguments.insert(arguments.end(), {"--candidates", "120", "--ellipsoids", "40"});
+    arguments.insert(arguments.end(),
+                     {"--candidates", "120", "--ellipsoids", "40", "--refine", "off"});
     return arguments;
 }
 
