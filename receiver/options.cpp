@@ -61,7 +61,7 @@ struct Texts {
     std::string status;
     std::string max_memory = "1.5G";
     std::string conceal = "on";
-    double idle_timeout = 2.0;
+    double idle_timeout = 3.0;
     double wait = -1.0;
     std::string psk;
     std::string state;

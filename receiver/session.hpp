@@ -43,7 +43,7 @@ std::string_view to_string(EndReason reason);
 
 struct SessionOptions {
     Until until = Until::end;
-    Time idle_timeout = std::chrono::seconds(2);  // after the last valid datagram
+    Time idle_timeout = std::chrono::seconds(3);  // after the last valid datagram
     std::optional<Time> wait;  // for the first valid datagram; empty: without end
     StoreLimits limits;
     PageChoice pages;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -93,6 +94,41 @@ std::vector<TimedDatagram> shuffled_with_copies(std::vector<TimedDatagram> datag
     common::shuffle(datagrams, random);
     for (TimedDatagram& datagram : datagrams) datagram.at = 1s;
     return datagrams;
+}
+
+std::vector<TimedDatagram> stretched(std::vector<TimedDatagram> datagrams,
+                                     std::chrono::nanoseconds length) {
+    const std::chrono::nanoseconds start = datagrams.front().at;
+    const std::chrono::duration<double> lasted = datagrams.back().at - start;
+    for (TimedDatagram& datagram : datagrams) {
+        const double share = std::chrono::duration<double>(datagram.at - start) / lasted;
+        datagram.at = start + std::chrono::duration_cast<std::chrono::nanoseconds>(share * length);
+    }
+    return datagrams;
+}
+
+std::vector<TimedDatagram> without_blackout(const std::vector<TimedDatagram>& datagrams,
+                                            std::chrono::nanoseconds begin,
+                                            std::chrono::nanoseconds end) {
+    std::vector<TimedDatagram> heard;
+    for (const TimedDatagram& datagram : datagrams) {
+        const std::chrono::nanoseconds at = datagram.at - datagrams.front().at;
+        if (at < begin || at >= end) heard.push_back(datagram);
+    }
+    return heard;
+}
+
+std::vector<TimedDatagram> some_of(const std::vector<TimedDatagram>& datagrams, std::size_t count,
+                                   std::uint64_t seed) {
+    std::vector<std::size_t> chosen(datagrams.size());
+    std::iota(chosen.begin(), chosen.end(), std::size_t{0});
+    common::Random random(seed);
+    common::shuffle(chosen, random);
+    chosen.resize(count);
+    std::sort(chosen.begin(), chosen.end());
+    std::vector<TimedDatagram> some;
+    for (const std::size_t k : chosen) some.push_back(datagrams[k]);
+    return some;
 }
 
 std::string written_bytes(const SimulatedReception& reception, unsigned threads, int grid) {

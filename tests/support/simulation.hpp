@@ -61,6 +61,19 @@ SimulatedReception receive(const std::vector<TimedDatagram>& datagrams,
 std::vector<TimedDatagram> shuffled_with_copies(std::vector<TimedDatagram> datagrams,
                                                 std::uint64_t seed);
 
+/// The datagrams farther apart, so that the last one leaves that long after the first.
+std::vector<TimedDatagram> stretched(std::vector<TimedDatagram> datagrams,
+                                     std::chrono::nanoseconds length);
+
+/// Those that do not leave from `begin` to just before `end`, counted from the first one.
+std::vector<TimedDatagram> without_blackout(const std::vector<TimedDatagram>& datagrams,
+                                            std::chrono::nanoseconds begin,
+                                            std::chrono::nanoseconds end);
+
+/// So many of them, chosen at random, in their order.
+std::vector<TimedDatagram> some_of(const std::vector<TimedDatagram>& datagrams, std::size_t count,
+                                   std::uint64_t seed);
+
 /// Bytes of the PLY that the receiver writes; empty when there is nothing to rebuild from.
 std::string written_bytes(const SimulatedReception& reception, unsigned threads,
                           int grid = receiver::ReconstructionOptions{}.grid);

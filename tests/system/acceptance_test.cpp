@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -17,6 +18,7 @@
 #include "receiver/reconstruction.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/meshes.hpp"
+#include "tests/support/sampling_gaps.hpp"
 #include "tests/support/simulation.hpp"
 
 using namespace ellicast;
@@ -162,6 +164,48 @@ void check_with_loss(const std::string& name, double drop, std::int64_t genus, d
     }
 }
 
+/// Gaps between the received vertices, and the mesh of them, which must be what was promised.
+tests::SamplingGaps check_reception(const tests::SimulatedModel& model,
+                                    const std::vector<tests::TimedDatagram>& heard) {
+    receiver::SessionOptions listening;
+    listening.wait = std::chrono::seconds(10);
+    const auto reception = tests::receive(heard, listening);
+    REQUIRE(reception.object);
+    const auto result = receiver::reconstruct(*reception.object);
+    REQUIRE(result);
+    const common::MeshTopology topology = common::analyse_topology(result->mesh);
+    CHECK(tests::is_as_hinted(topology, reception.object->hint));
+    return tests::sampling_gaps(model.original.positions,
+                                tests::received_positions(*reception.object));
+}
+
+/// Two seconds of ten, at the start of a round, in its middle, and at its end, beside the worst of
+/// three losses of as many datagrams anywhere.
+void check_blackouts(const std::string& name) {
+    const auto model = reference_model(name);
+    if (!model) return;
+    const auto sent =
+        tests::stretched(tests::broadcast(model->loaded.object), std::chrono::milliseconds(9999));
+    const auto lasted = std::chrono::seconds(2);
+    const std::size_t as_many =
+        tests::without_blackout(sent, std::chrono::seconds(4), std::chrono::seconds(6)).size();
+    tests::SamplingGaps anywhere;
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+        const auto gaps = check_reception(*model, tests::some_of(sent, as_many, seed));
+        anywhere.percentile_99 = std::max(anywhere.percentile_99, gaps.percentile_99);
+        anywhere.largest = std::max(anywhere.largest, gaps.largest);
+    }
+    for (const int begin : {0, 4, 8}) {
+        const std::chrono::seconds at(begin);
+        const auto gaps = check_reception(*model, tests::without_blackout(sent, at, at + lasted));
+        WARN(name << ", silent from " << begin << " s: of the gaps 99 % below "
+                  << gaps.percentile_99 << " (anywhere " << anywhere.percentile_99
+                  << "), the largest " << gaps.largest << " (" << anywhere.largest << ")");
+        CHECK(gaps.percentile_99 <= 1.3 * anywhere.percentile_99);
+        CHECK(gaps.largest <= 2.5 * anywhere.largest);
+    }
+}
+
 }  // namespace
 
 TEST_CASE("horse arrives whole without loss", "[long]") {
@@ -194,6 +238,13 @@ TEST_CASE("fertility keeps its four handles at 30 % loss, five seeds of five", "
 }
 TEST_CASE("rocker-arm keeps its hole at 30 % loss, five seeds of five", "[long]") {
     check_with_loss("rocker-arm", 0.3, 1, 4e-4);
+}
+
+TEST_CASE("a blackout of two seconds in ten leaves horse closed and evenly sampled", "[long]") {
+    check_blackouts("horse");
+}
+TEST_CASE("and fertility, which has handles", "[long]") {
+    check_blackouts("fertility");
 }
 
 TEST_CASE("ellipsoids alone make horse's shape", "[long]") {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -14,6 +15,7 @@
 #include "receiver/reconstruction.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/meshes.hpp"
+#include "tests/support/sampling_gaps.hpp"
 #include "tests/support/simulation.hpp"
 
 using namespace ellicast;
@@ -206,43 +208,97 @@ TEST_CASE("losses in bursts have the share and the length asked for") {
     CHECK_THROWS_AS(tests::bursty_loss(0.3, 0.5), std::invalid_argument);
 }
 
-TEST_CASE("a blackout of two seconds in a stream of ten leaves a closed mesh, evenly sampled") {
-    // As slow as that: the same datagrams, farther apart.
-    std::vector<tests::TimedDatagram> sent = tests::broadcast(ring().loaded.object);
-    const auto start = sent.front().at;
-    const auto lasted = sent.back().at - start;
-    const double begin = GENERATE(0.0, 2.0, 4.0, 7.9);  // seconds
-    CAPTURE(begin);
+namespace {
+
+constexpr std::chrono::nanoseconds kStream = std::chrono::milliseconds(9999);
+constexpr std::chrono::nanoseconds kBlackout = std::chrono::seconds(2);
+
+/// A round as a stream of ten seconds, and what is heard of it when two of them are silent.
+struct Blackout {
+    std::vector<tests::TimedDatagram> sent;
     std::vector<tests::TimedDatagram> heard;
-    for (tests::TimedDatagram& datagram : sent) {
-        const double at = 10.0 * std::chrono::duration<double>(datagram.at - start) / lasted;
-        datagram.at = start + std::chrono::nanoseconds(static_cast<std::int64_t>(at * 1e9));
-        if (at < begin || at >= begin + 2.0) heard.push_back(datagram);
-    }
+};
+Blackout blackout(const sender::BroadcastObject& object, std::chrono::nanoseconds begin) {
+    Blackout made;
+    made.sent = tests::stretched(tests::broadcast(object), kStream);
+    made.heard = tests::without_blackout(made.sent, begin, begin + kBlackout);
+    return made;
+}
+
+/// With the silence that the program waits out by default.
+tests::SimulatedReception listen(const std::vector<tests::TimedDatagram>& heard) {
     receiver::SessionOptions options;
-    options.idle_timeout = std::chrono::seconds(3);
-    options.wait = std::chrono::seconds(10);
-    const tests::SimulatedReception reception = tests::receive(heard, options);
+    options.wait = kStream;
+    tests::SimulatedReception reception = tests::receive(heard, options);
     REQUIRE(reception.object);
+    return reception;
+}
+
+tests::SamplingGaps gaps_of(const tests::SimulatedModel& model,
+                            const receiver::ReceivedObject& object) {
+    return tests::sampling_gaps(model.original.positions, tests::received_positions(object));
+}
+
+/// What as many datagrams, lost anywhere, leave: medians of some seeds.
+tests::SamplingGaps gaps_anywhere(const tests::SimulatedModel& model, const Blackout& blackout) {
+    constexpr std::size_t kSeeds = 9;
+    std::vector<double> percentiles;
+    std::vector<double> largest;
+    for (std::size_t seed = 1; seed <= kSeeds; ++seed) {
+        const auto heard = tests::some_of(blackout.sent, blackout.heard.size(), seed);
+        const tests::SamplingGaps gaps = gaps_of(model, *listen(heard).object);
+        percentiles.push_back(gaps.percentile_99);
+        largest.push_back(gaps.largest);
+    }
+    std::sort(percentiles.begin(), percentiles.end());
+    std::sort(largest.begin(), largest.end());
+    return {percentiles[kSeeds / 2], largest[kSeeds / 2]};
+}
+
+/// Its vertices along an axis: those of one datagram are neighbours.
+tests::SimulatedModel in_slices(tests::SimulatedModel model) {
+    std::sort(model.loaded.object.vertices.begin(), model.loaded.object.vertices.end(),
+              [](const auto& a, const auto& b) { return a.position < b.position; });
+    return model;
+}
+
+}  // namespace
+
+TEST_CASE("a blackout of two seconds in a stream of ten leaves a closed mesh") {
+    const std::chrono::milliseconds begin(GENERATE(0, 2000, 4000, 7900, 8000));
+    CAPTURE(begin.count());
+    const Blackout made = blackout(ring().loaded.object, begin);
+    const tests::SimulatedReception reception = listen(made.heard);
     const receiver::StreamCounts& counts = reception.summary.datagrams;
-    CHECK(counts.received == heard.size());
-    const std::uint64_t lost = sent.size() - heard.size();
-    if (begin > 0.0) {
-        CHECK(counts.lost == lost);
+    CHECK(counts.received == made.heard.size());
+    const std::uint64_t lost = made.sent.size() - made.heard.size();
+    CHECK(lost >= made.sent.size() / 5);
+    // Of a stream that was joined late, nobody knows what went before.
+    if (begin.count() > 0) CHECK(counts.lost == lost);
+    if (begin.count() > 0 && begin + kBlackout < kStream) {
         CHECK(counts.pattern.longest_run == lost);
     }
     const receiver::Reconstruction result = rebuilt(*reception.object);
     CHECK(is_closed_manifold(result.mesh));
     CHECK(result.topology_as_promised);
+}
 
-    // Octants of the ring have equal shares of its vertices, and should have of the received.
-    std::array<double, 8> octants{};
-    for (const Eigen::Vector3d& p : tests::received_positions(*reception.object)) {
-        octants[(p.x() > 0 ? 1 : 0) + (p.y() > 0 ? 2 : 0) + (p.z() > 0 ? 4 : 0)] += 1.0;
-    }
-    const double mean = static_cast<double>(reception.object->vertices.size()) / 8.0;
-    for (const double octant : octants) {
-        CHECK(octant > 0.8 * mean);
-        CHECK(octant < 1.2 * mean);
-    }
+TEST_CASE("what a blackout leaves is as evenly sampled as by losses anywhere") {
+    const std::chrono::milliseconds begin(GENERATE(0, 2000, 4000, 6000, 8000));
+    CAPTURE(begin.count());
+    const Blackout made = blackout(ring().loaded.object, begin);
+    const tests::SamplingGaps gaps = gaps_of(ring(), *listen(made.heard).object);
+    const tests::SamplingGaps anywhere = gaps_anywhere(ring(), made);
+    CAPTURE(gaps.percentile_99, anywhere.percentile_99, gaps.largest, anywhere.largest);
+    CHECK(gaps.percentile_99 <= 1.25 * anywhere.percentile_99);
+    CHECK(gaps.largest <= 1.5 * anywhere.largest);
+}
+
+TEST_CASE("of a model that is sent slice by slice a blackout leaves a hole, which gaps show") {
+    static const tests::SimulatedModel sliced = in_slices(ring());
+    const Blackout made = blackout(sliced.loaded.object, std::chrono::seconds(4));
+    const tests::SamplingGaps gaps = gaps_of(sliced, *listen(made.heard).object);
+    const tests::SamplingGaps spread = gaps_of(
+        ring(), *listen(blackout(ring().loaded.object, std::chrono::seconds(4)).heard).object);
+    CHECK(gaps.percentile_99 > 2.0 * spread.percentile_99);
 }

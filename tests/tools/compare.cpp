@@ -10,7 +10,7 @@
 namespace ellicast::tests {
 namespace {
 
-enum class Mode { compare, tables, bursts, prefixes, coarse };
+enum class Mode { compare, tables, bursts, blackouts, prefixes, coarse };
 
 struct CommandLine {
     CompareOptions options;
@@ -19,12 +19,14 @@ struct CommandLine {
     bool no_intersections = false;
     bool quick = false;
     bool bursts = false;
+    bool blackouts = false;
     bool prefixes = false;
     bool coarse = false;
 
     [[nodiscard]] Mode mode() const {
         if (!tables_of.empty()) return Mode::tables;
         if (bursts) return Mode::bursts;
+        if (blackouts) return Mode::blackouts;
         if (prefixes) return Mode::prefixes;
         return coarse ? Mode::coarse : Mode::compare;
     }
@@ -69,6 +71,8 @@ void add_options(CLI::App& app, CommandLine& line) {
     app.add_flag("--quick", line.quick, "One seed, three losses, fewer samples, no anytime curve");
     app.add_flag("--burst-check", line.bursts,
                  "Instead: bursts beside an even loss of as many records");
+    app.add_flag("--blackout-check", line.blackouts,
+                 "Instead: two seconds of ten lost beside as many datagrams lost anywhere");
     app.add_flag("--prefix-check", line.prefixes,
                  "Instead: the first vertices by importance beside the first of a spread order");
     app.add_flag("--coarse", line.coarse, "Instead: the ellipsoids alone, as volume in common");
@@ -100,6 +104,8 @@ void run(CommandLine& line) {
             return write_tables(line.tables_of);
         case Mode::bursts:
             return check_bursts(line.options);
+        case Mode::blackouts:
+            return check_blackouts(line.options);
         case Mode::prefixes:
             return check_prefixes(line.options);
         case Mode::coarse:

@@ -71,13 +71,6 @@ class OrderedRows {
     std::size_t next_ = 0;
 };
 
-double median(std::vector<double> values) {
-    if (values.empty()) return ComparisonRow::kNone;
-    std::sort(values.begin(), values.end());
-    const std::size_t half = values.size() / 2;
-    return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
-}
-
 // `count` of the indices below `all`, ascending.
 std::vector<std::uint32_t> some_of(std::size_t all, std::size_t count, common::Random& random) {
     std::vector<std::uint32_t> indices(all);
@@ -152,6 +145,13 @@ void run_jobs(std::size_t count, unsigned jobs, const std::function<void(std::si
     common::parallel_for(jobs, jobs, [&](std::size_t, std::size_t) {
         for (std::size_t k = next++; k < count; k = next++) body(k);
     });
+}
+
+double median(std::vector<double> values) {
+    if (values.empty()) return ComparisonRow::kNone;
+    std::sort(values.begin(), values.end());
+    const std::size_t half = values.size() / 2;
+    return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
 void compare_all(const CompareOptions& options) {

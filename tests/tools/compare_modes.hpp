@@ -32,6 +32,9 @@ void finish(std::ofstream& file, const std::filesystem::path& path);
 /// rethrown when all have ended.
 void run_jobs(std::size_t count, unsigned jobs, const std::function<void(std::size_t)>& body);
 
+/// Of an even number of values the mean of the middle two; kNone of none.
+double median(std::vector<double> values);
+
 /// The whole comparison: compare.csv, row by row as cells end, in order; then the tables.
 void compare_all(const CompareOptions& options);
 
@@ -41,6 +44,12 @@ void write_tables(const std::filesystem::path& csv);
 /// Bursts of mean 20 datagrams at 20 % loss beside as many ellipsoids and vertices taken from
 /// anywhere: burst-check.csv, and a Markdown table of the medians of their rms on standard output.
 void check_bursts(const CompareOptions& options);
+
+/// Every round as a stream of ten seconds, with a blackout of two at its start, in the middle and
+/// at its end, beside as many datagrams lost anywhere: distances from the original's vertices to
+/// the nearest received one, and errors with 8-bit normals. blackout-check.csv, and a Markdown
+/// table on standard output; what is anywhere is the median of the seeds.
+void check_blackouts(const CompareOptions& options);
 
 /// All ellipsoids and the first 10, 25 and 50 % of the vertices, by importance and spread, with and
 /// without tags and concealment, and the floors of the same vertices: prefix-check.csv, and a
