@@ -54,7 +54,8 @@ std::string session_description_text(const SessionDescription& description);
 
 /// Reads what others may have written: of several media the first that is ours, by its a=rtpmap.
 /// Lines may end in LF alone; attributes that are not known, and what is said of other media, are
-/// passed over. A filter of sources for a destination that is no group is as good as none. Throws
+/// passed over. A filter of sources for a destination that is no group is as good as none; one that
+/// cannot be honoured, or is for an address that no c= line has, is an error. Throws
 /// SessionDescriptionError. Linear in the text's length.
 SessionDescription parse_session_description(std::string_view text);
 

@@ -102,11 +102,12 @@ std::optional<std::string_view> of_type(std::string_view value, std::uint8_t typ
     return value;
 }
 
-/// Encoding names have no case (RFC 4855).
-bool is_our_encoding(std::string_view name) {
-    return std::ranges::equal(name, std::string_view("ellicast"), [](char a, char b) {
-        return (a >= 'A' && a <= 'Z' ? static_cast<char>(a - 'A' + 'a') : a) == b;
-    });
+/// Whatever the case of their letters.
+bool is_same_word(std::string_view a, std::string_view b) {
+    const auto small = [](char c) {
+        return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    };
+    return std::ranges::equal(a, b, {}, small, small);
 }
 
 /// The session's own lines, and those of each medium.
@@ -152,7 +153,7 @@ std::optional<OurMedium> our_medium(Lines medium) {
         if (!type || !offered[*type]) continue;
         const std::string_view encoding = *of_type(map, *type);
         const std::string_view name = encoding.substr(0, encoding.find('/'));
-        if (!is_our_encoding(name)) continue;
+        if (!is_same_word(name, "ellicast")) continue;  // RFC 4855: names have no case
         return OurMedium{words[1], *type, encoding.substr(name.size()), line.number};
     }
     return std::nullopt;
@@ -245,20 +246,50 @@ const Line* find_line(char type, Lines session, Lines medium) {
     return found;
 }
 
-bool is_about(const SessionDescription& description, std::string_view destination) {
-    return destination == "*" ||
-           parse_ip_address(destination) == parse_ip_address(description.address);
+/// By value, or, where one is a name, letter by letter; names have no case.
+bool is_same_address(std::string_view a, std::string_view b) {
+    const auto number = parse_ip_address(a);
+    return number ? number == parse_ip_address(b) : is_same_word(a, b);
+}
+
+/// Addresses of c= lines, those of other media too.
+std::vector<std::string_view> connections_of(const Sections& sections) {
+    std::vector<std::string_view> addresses;
+    const auto add = [&](Lines lines) {
+        for (const Line& line : lines) {
+            const Words words = words_of(line.type == 'c' ? line.value : "");
+            if (words.size() == 3) addresses.push_back(words[2].substr(0, words[2].find('/')));
+        }
+    };
+    add(sections.session);
+    std::ranges::for_each(sections.media, add);
+    return addresses;
+}
+
+/// Whether a filter is for our group, by `destinations` or by all of them. One that is for none of
+/// those that it may be for is a mistake: to pass over it would open the group to all sources. So
+/// is a name that no c= line has, for it may be our group's.
+bool is_about(const Line& line, std::string_view destination, const SessionDescription& description,
+              std::span<const std::string_view> destinations) {
+    if (destination == "*" || is_same_address(destination, description.address)) return true;
+    const auto is_it = [&](std::string_view other) { return is_same_address(destination, other); };
+    if (std::ranges::none_of(destinations, is_it)) {
+        throw Error(line.number, "the filter is for " + quoted(destination) +
+                                     ", which is not the address of its c= line");
+    }
+    return false;
 }
 
 /// RFC 4570: "incl IN IP4 GROUP SOURCES".
-void read_filter(const Line& line, std::string_view value, SessionDescription& description) {
+void read_filter(const Line& line, std::string_view value,
+                 std::span<const std::string_view> destinations, SessionDescription& description) {
     const Words words = words_of(value);
     if (words.size() < 5 || (words[0] != "incl" && words[0] != "excl")) {
         throw Error(line.number, "expected a=source-filter: incl IN IP4 GROUP SOURCE");
     }
     const bool any_family = words[2] == "*";
     const bool v6 = is_v6(line, words[1], any_family ? "IP4" : words[2]);
-    if (!is_about(description, words[3])) return;
+    if (!is_about(line, words[3], description, destinations)) return;
     const auto source = parse_ip_address(words[4]);
     if (words[0] == "excl") throw Error(line.number, "sources can be chosen, not excluded");
     if (words.size() > 5 || !description.source.empty()) {
@@ -272,19 +303,21 @@ void read_filter(const Line& line, std::string_view value, SessionDescription& d
     description.source = words[4];
 }
 
-/// A medium's own filters stand in for the session's.
-void read_filters(Lines session, Lines medium, SessionDescription& description) {
+/// A medium's own filters stand in for the session's, all of them (RFC 4570 section 3.1), and can
+/// only be for its own group; the session's for those of any medium.
+void read_filters(const Sections& sections, Lines medium, SessionDescription& description) {
     if (!description.to_group()) return;
-    bool found = false;
-    for (const Lines lines : {medium, session}) {
+    const auto read = [&](Lines lines, std::span<const std::string_view> destinations) {
+        bool found = false;
         for (const Line& line : lines) {
             const auto value = attribute(line, "source-filter");
             if (!value) continue;
             found = true;
-            read_filter(line, *value, description);
+            read_filter(line, *value, destinations, description);
         }
-        if (found) return;
-    }
+        return found;
+    };
+    if (!read(medium, {})) read(sections.session, connections_of(sections));
 }
 
 bool is_key(std::string_view text) {
@@ -399,7 +432,7 @@ SessionDescription parse_session_description(std::string_view text) {
         const Line* const connection = find_line('c', sections.session, medium);
         if (!connection) throw Error(medium[0].number, "there is no c= line for this stream");
         read_connection(*connection, description);
-        read_filters(sections.session, medium, description);
+        read_filters(sections, medium, description);
         read_attributes(medium, description);
         read_bandwidth(sections.session, medium, description);
         return description;

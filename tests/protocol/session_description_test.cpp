@@ -146,7 +146,7 @@ TEST_CASE("of several media the first that is ours is taken, with its own lines"
     CHECK(read.sender.empty());
 }
 
-TEST_CASE("hosts may have names, groups need no TTL, and filters of other groups do not count") {
+TEST_CASE("hosts may have names, groups need no TTL, and filters may be for all of them") {
     const auto read = [](const std::string& line, const std::string& other) {
         return parse_session_description(with(line, other));
     };
@@ -155,11 +155,45 @@ TEST_CASE("hosts may have names, groups need no TTL, and filters of other groups
     CHECK(read(kConnection, "c=IN IP4 192.0.2.7").source.empty());
     CHECK_FALSE(read(kConnection, "c=IN IP4 239.255.0.1").ttl.has_value());
     CHECK(read(kConnection, "c=IN IP4 239.255.0.1/0/1").ttl == 0);
-    CHECK(read(kFilter, "a=source-filter: incl IN IP4 239.255.0.2 10.77.0.1").source.empty());
-    CHECK(read(kFilter, "a=source-filter: excl IN IP4 239.255.0.2 10.77.0.1").source.empty());
     CHECK(read(kFilter, "a=source-filter: incl IN IP4 * 10.77.0.9").source == "10.77.0.9");
     CHECK(read(kFilter, "").source.empty());
     CHECK(read(kMedium, "m=application 5004/1 RTP/AVP 96").port == 5004);
+}
+
+TEST_CASE("the session's filters for other media's addresses do not count") {
+    // By value, and names whatever their case.
+    const std::string filter = GENERATE(
+        "incl IN IP6 ff15:0::77 fd77::1", "excl IN IP6 ff15::77 fd77::1 fd77::2",
+        "incl IN IP4 Hall.example.org 10.77.0.1", "incl IN * hall.example.org host.example.org");
+    CAPTURE(filter);
+    const std::string text = with(kFilter, "a=source-filter: " + filter) +
+                             "m=audio 5010 RTP/AVP 0\r\nc=IN IP6 ff15::77\r\n"
+                             "m=audio 5012 RTP/AVP 0\r\nc=IN IP4 hall.EXAMPLE.org\r\n";
+    CHECK(parse_session_description(text).source.empty());
+}
+
+TEST_CASE("a medium's own filter stands in for the session's") {
+    const std::string own = "a=source-filter: incl IN IP4 239.255.0.1 10.77.0.9\r\n";
+    CHECK(parse_session_description(kGolden + own).source == "10.77.0.9");
+    CHECK(parse_session_description(with(kFilter, "a=source-filter: excl IN IP4 * 10.77.0.9") + own)
+              .source == "10.77.0.9");
+}
+
+TEST_CASE("filters for an address that no c= line of theirs has are refused, with it") {
+    const auto [before, address, after] = GENERATE(table<std::string, std::string, std::string>(
+        {{"incl IN IP4 ", "239.255.0.2", " 10.77.0.1"},
+         {"excl IN IP4 ", "239.255.0.2", " 10.77.0.1"},
+         {"incl IN IP4 ", "group.example.org", " 10.77.0.1"},
+         {"incl IN * ", "group.example.org", " 10.77.0.1"},
+         {"incl IN IP6 ", "ff15::1", " fd77::1"},
+         {"incl IN IP4 ", "239.255.0.1/4", " 10.77.0.1"}}));
+    CAPTURE(before, address);
+    const std::string filter = "a=source-filter: " + before + address + after;
+    const std::string said = ": the filter is for '" + address + "'";
+    CHECK_THAT(reason_with(kFilter, filter), Catch::StartsWith("line 8" + said));
+    // A medium's own cannot be about another medium either.
+    const std::string elsewhere = "m=audio 5010 RTP/AVP 0\r\nc=IN IP4 239.255.0.2\r\n";
+    CHECK_THAT(reason(kGolden + filter + "\r\n" + elsewhere), Catch::StartsWith("line 15" + said));
 }
 
 TEST_CASE("what cannot be is told with its line") {
