@@ -24,6 +24,7 @@
 #include <cstring>
 #include <thread>
 
+#include "receiver/group_route.hpp"
 #include "receiver/receive_thread.hpp"
 #include "receiver/socket_settings.hpp"
 
@@ -65,12 +66,15 @@ udp::endpoint on_interface(udp::endpoint endpoint, unsigned interface) {
     return {address, endpoint.port()};
 }
 
+std::string name_of(unsigned interface) {
+    std::array<char, IF_NAMESIZE> name{};
+    return ::if_indextoname(interface, name.data()) != nullptr ? name.data() : "";
+}
+
 /// The interface that the user named, by option or with a group of one link; empty where none.
 std::string name_of_interface(const ListenOptions& options, const udp::endpoint& endpoint) {
     if (!options.interface.empty() || !endpoint.address().is_v6()) return options.interface;
-    std::array<char, IF_NAMESIZE> name{};
-    const auto scope = static_cast<unsigned>(endpoint.address().to_v6().scope_id());
-    return ::if_indextoname(scope, name.data()) != nullptr ? name.data() : "";
+    return name_of(static_cast<unsigned>(endpoint.address().to_v6().scope_id()));
 }
 
 ::sockaddr_storage storage_of(const udp::endpoint& endpoint) {
@@ -96,6 +100,7 @@ struct UdpEndpoint::Impl {
     // Where we listen, to find it again.
     udp::endpoint bound;
     std::string interface;  // by name; empty: none in particular
+    bool by_route = false;  // the routes chose it, not the user
     unsigned interface_number = 0;
     std::string source;
     bool complained = false;
@@ -109,6 +114,8 @@ struct UdpEndpoint::Impl {
 
     void open(const ListenOptions& options);
     void join();
+    void find_interface(const ListenOptions& options);
+    [[nodiscard]] unsigned present_interface() const;
     void follow_interface();
     void post_turn();
     void take_turn();
@@ -150,11 +157,19 @@ void UdpEndpoint::Impl::open(const ListenOptions& options) {
         throw ListenError("cannot listen on " + text_of(endpoint) + ": " + error.message());
     }
     bound = endpoint;
-    interface = name_of_interface(options, endpoint);
-    interface_number = interface_index(interface);
+    find_interface(options);
     if (group) join();
     socket.non_blocking(true);
     set_reception(socket.native_handle(), kReceiveBuffer);
+}
+
+/// A group that is joined where the routes lead is joined there by name all the same, for a
+/// membership goes with its interface.
+void UdpEndpoint::Impl::find_interface(const ListenOptions& options) {
+    interface = name_of_interface(options, bound);
+    by_route = interface.empty() && bound.address().is_multicast();
+    if (by_route) interface = name_of(interface_of_route(storage_of(bound)));
+    interface_number = interface_index(interface);
 }
 
 void UdpEndpoint::Impl::join() {
@@ -170,10 +185,17 @@ void UdpEndpoint::Impl::join() {
     join_group(socket.native_handle(), group, interface_number, &from);
 }
 
+/// Where to listen now: our interface, or, while it is away and the user named none, where the
+/// routes lead instead. 0 for nowhere.
+unsigned UdpEndpoint::Impl::present_interface() const {
+    const unsigned number = interface.empty() ? 0 : ::if_nametoindex(interface.c_str());
+    return number == 0 && by_route ? interface_of_route(storage_of(bound)) : number;
+}
+
 /// An interface that goes down and comes up keeps its memberships. One that was away, unplugged or
 /// with its driver, is another one to the kernel when it returns, and this socket deaf to it.
 void UdpEndpoint::Impl::follow_interface() {
-    const unsigned number = interface.empty() ? 0 : ::if_nametoindex(interface.c_str());
+    const unsigned number = present_interface();
     if (number == 0 || number == interface_number) return;
     const int native = socket.native_handle();
     try {
@@ -185,10 +207,13 @@ void UdpEndpoint::Impl::follow_interface() {
         }
         interface_number = number;
         complained = false;
-        spdlog::info("{} is back: listening there again", interface);
+        const std::string there = name_of(number);
+        const bool back = there == interface;
+        spdlog::info("{} {}: listening there{}", there, back ? "is back" : "has the route now",
+                     back ? " again" : "");
     } catch (const ListenError& error) {
         interface_number = 0;  // tried again
-        if (!complained) spdlog::warn("{} is back, but: {}", interface, error.what());
+        if (!complained) spdlog::warn("{} is there, but: {}", name_of(number), error.what());
         complained = true;
     }
 }

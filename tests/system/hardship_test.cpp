@@ -208,6 +208,62 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("a group that was joined where the routes lead is joined again when that returns") {
+    // Nobody names an interface. The kernel forgets the route with the interface, and nothing in
+    // this test brings it back: whoever comes back by the name is the one that was meant.
+    MadeNetwork network(2);
+    if (!network.missing().empty()) {
+        WARN("SKIPPED: " << network.missing());
+        return;
+    }
+    const bool v6 = GENERATE(false, true);
+    const bool elsewhere = GENERATE(false, true);  // another interface takes over meanwhile
+    CAPTURE(v6, elsewhere);
+    const std::string space = network.receiver();
+    const auto ip = [&](Words words) {
+        words.insert(words.begin(), {"ip", v6 ? "-6" : "-4"});
+        return tests::run_program(MadeNetwork::inside(space, words)).code == 0;
+    };
+    // Who is a member, by interface: of either family the kernel's own list.
+    const auto is_joined_on = [&](const std::string& interface) {
+        const std::string members =
+            tests::run_program(
+                MadeNetwork::inside(space, {"ip", "maddress", "show", "dev", interface}))
+                .out;
+        return members.find(v6 ? "ff15::77" : "239.255.77.1") != std::string::npos;
+    };
+    const Place place("300k");
+    const std::string group = v6 ? "[ff15::77]:5004" : "239.255.77.1:5004";
+    if (!v6) REQUIRE(ip({"route", "add", "239.0.0.0/8", "dev", "near"}));
+    if (elsewhere) {
+        REQUIRE(ip({"link", "add", "other", "type", "veth", "peer", "name", "far"}));
+        REQUIRE(ip({"link", "set", "far", "up"}));
+        REQUIRE(ip({"link", "set", "other", "up"}));
+        if (!v6) REQUIRE(ip({"route", "add", "239.0.0.0/8", "dev", "other", "metric", "9"}));
+    }
+    const Process sender =
+        start(MadeNetwork::inside(network.sender(), place.sending(group, {"--interface", "near"})));
+    REQUIRE(sender->await_err("ring.ply: 3600 vertices"));
+    const Process receiver =
+        start(MadeNetwork::inside(space, place.listening("receiver", group, "forever")));
+    REQUIRE(receiver->await_err("listening on "));
+    REQUIRE(place.await_reception("receiver"));
+    CHECK(is_joined_on("near"));
+    REQUIRE(network.unplug(space));
+    const std::uint64_t before = place.await_silence("receiver");
+    if (elsewhere) CHECK(eventually([&] { return is_joined_on("other"); }));
+    REQUIRE(network.plug_in(space));
+    const bool again = place.await_reception("receiver", before);
+    INFO(receiver->err());
+    REQUIRE(again);
+    (void)place.await_all("receiver");
+    if (elsewhere) CHECK_FALSE(is_joined_on("other"));
+    CHECK(tells_of_return(*receiver));
+    stop(*receiver);
+    stop(*sender);
+    place.check_result("receiver");
+}
+
 TEST_CASE("a clock that is set by hours while a carousel is on air changes nothing") {
 #if !defined(ELLICAST_FAKETIME)
     WARN("SKIPPED: libfaketime is not there");
