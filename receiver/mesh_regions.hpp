@@ -12,12 +12,11 @@
 namespace ellicast::receiver {
 
 /// Parts of a mesh on which surgery may go on at one time: slabs across its longest extent, each
-/// with about the same number of faces. A vertex is inner when all its faces lie in one region.
-/// Surgery that starts from a face of its region and reads and writes nothing but faces with an
-/// inner corner, and positions of their corners, never meets that of another region. It must leave
-/// faces at border vertices as they are, and then those vertices stay at the border, inner ones
-/// stay inner, and so are new ones. The partition depends on the mesh alone, so that what is done
-/// in it does not depend on the number of threads.
+/// with about the same number of faces. A face is inner when all faces at its three corners are of
+/// one region. Surgery of a region starts from inner faces of its own, changes inner faces only,
+/// and walks around none but their corners; then it never meets that of another region, and borders
+/// stay as they are. New faces are inner. The partition depends on the mesh alone, so that what is
+/// done in it does not depend on the number of threads.
 class MeshRegions {
   public:
     /// As many regions as are worth their borders; a single one in a small mesh. `shifted` puts the
