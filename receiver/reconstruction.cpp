@@ -48,7 +48,7 @@ class Pipeline {
 
     std::optional<Reconstruction> run() {
         if (!extract_coarse_surface()) return std::nullopt;
-        if (!points_.empty()) {
+        if (received() > 0) {
             stage("wrap");
             unwrapped_ = coarse_->mesh;
             shrink_wrap(coarse_->mesh, points_, kWrapRounds, options_.threads);
@@ -113,32 +113,32 @@ class Pipeline {
         left_out_ =
             insert_points(surface_, points_, std::span(order).first(first), options_.threads);
         if (options_.keep_stages) stages_.halfway = to_model_frame(surface_.mesh.extract());
-        const bool whole = points_.size() == object_.hint.vertices;
+        const bool whole = received() == object_.hint.vertices;
         const bool all_in = first == points_.size() && left_out_.empty();
-        settle(whole && all_in);
+        settle(whole && all_in, all_in);
         if (all_in) return;
         std::vector<std::uint32_t> rest(order.begin() + static_cast<std::ptrdiff_t>(first),
                                         order.end());
         rest.insert(rest.end(), left_out_.begin(), left_out_.end());
         stage("insert");
         left_out_ = insert_points(surface_, points_, rest, options_.threads);
-        settle(whole);
+        settle(whole, true);
     }
 
     // Removes marching-cubes vertices, puts the received ones where they belong, mends the
     // triangulation. Where every vertex arrived, `whole`, no marching-cubes vertex has a place in
-    // the result.
-    void settle(bool whole) {
+    // the result. Points are not asked for after the `last` time.
+    void settle(bool whole, bool last) {
         std::vector<bool> needed(surface_.mesh.vertex_slots(), false);
         if (!whole) {
             const double spacing = spacing_cells();
             needed = needed_coarse_vertices(spacing);
             if (conceals() && spacing > kSparseEnough) keep_what_is_missed(needed);
         }
-        settle_with(needed);
+        settle_with(needed, last);
     }
 
-    void settle_with(const std::vector<bool>& needed) {
+    void settle_with(const std::vector<bool>& needed, bool last) {
         stage("remove");
         const auto removable = [&](VertexId v) {
             return surface_.point_of_vertex[v] == kNone && !needed[v];
@@ -146,6 +146,7 @@ class Pipeline {
         remove_vertices(surface_.mesh, removable, options_.threads);
         stage("shift");
         shift_to_points(surface_, points_);
+        if (last) points_ = std::vector<Vector3d>();  // flips need the room
         stage("flip");
         flip_all_to_delaunay(surface_.mesh, options_.threads);
         fix_edges();
@@ -155,7 +156,7 @@ class Pipeline {
     // Tries what received vertices alone would give. Coarse vertices that this misses stay, too.
     void keep_what_is_missed(std::vector<bool>& needed) {
         const PointSurface before = surface_;
-        settle_with(needed);
+        settle_with(needed, false);
         Extracted trial = extract();
         const common::TriangleMesh mesh = trial.mesh;
         std::vector<double> doubts = doubts_at(mesh.positions);
@@ -183,8 +184,8 @@ class Pipeline {
     // Edges that the sender names, between vertices that are there.
     void fix_edges() {
         fixed_ = FixedEdges(surface_.mesh.vertex_slots());
-        if (object_.edges.empty() || points_.empty()) return;
-        std::vector<VertexId> slot_of(points_.size(), kNone);
+        if (object_.edges.empty() || received() == 0) return;
+        std::vector<VertexId> slot_of(received(), kNone);
         for (VertexId v = 0; v < surface_.mesh.vertex_slots(); ++v) {
             const std::uint32_t point = surface_.point_of_vertex[v];
             if (point != kNone && surface_.mesh.vertex_alive(v)) slot_of[point] = v;
@@ -238,10 +239,11 @@ class Pipeline {
         return marks;
     }
 
+    [[nodiscard]] std::size_t received() const { return object_.vertices.size(); }
+
     // Of vertices; the one loss that geometry knows of (DESIGN section 1).
     [[nodiscard]] double loss() const {
-        return 1.0 -
-               static_cast<double>(points_.size()) / static_cast<double>(object_.hint.vertices);
+        return 1.0 - static_cast<double>(received()) / static_cast<double>(object_.hint.vertices);
     }
 
     // Ring tags know better than any shape criterion which edges there were.
@@ -255,7 +257,7 @@ class Pipeline {
             witnesses[v] = {common::ring_hash(object_.vertex_index[point]),
                             static_cast<std::uint8_t>(object_.vertices[point].ring), true};
         }
-        if (points_.size() < object_.hint.vertices) return mend_lossy(witnesses);
+        if (received() < object_.hint.vertices) return mend_lossy(witnesses);
         SurfaceMesh other = surface_.mesh;
         flip_all_to_delaunay(other, options_.threads);
         if (ring_agreement(other, witnesses).agree > ring_agreement(surface_.mesh, witnesses).agree)
@@ -329,7 +331,7 @@ class Pipeline {
         for (FaceId f = 0; f < surface_.mesh.face_slots(); ++f) {
             if (surface_.mesh.face_alive(f)) area += 0.5 * surface_.mesh.area_normal(f).norm();
         }
-        return std::sqrt(area / static_cast<double>(points_.size())) / coarse_->cell;
+        return std::sqrt(area / static_cast<double>(received())) / coarse_->cell;
     }
 
     // Where vertices lie closer than kSparse cells, concealment knows better than marching-cubes
@@ -364,7 +366,7 @@ class Pipeline {
     };
     Extracted extract() {
         Extracted result;
-        if (points_.empty()) {
+        if (received() == 0) {
             result.mesh = std::move(coarse_->mesh);
             result.point.assign(result.mesh.positions.size(), kNone);
             return result;
@@ -383,7 +385,7 @@ class Pipeline {
     [[nodiscard]] Gaps gaps() const {
         if (!object_.hint.by_importance) return {loss(), 0.0};
         const double span = 1.0 + object_.vertex_index.back();
-        const double lost = 1.0 - static_cast<double>(points_.size()) / span;
+        const double lost = 1.0 - static_cast<double>(received()) / span;
         const double to_come = 1.0 - span / static_cast<double>(object_.hint.vertices);
         return {lost, to_come * to_come};
     }
@@ -402,7 +404,7 @@ class Pipeline {
     }
 
     [[nodiscard]] bool conceals() const {
-        return options_.conceal && !points_.empty() && loss() > 0.0;
+        return options_.conceal && received() > 0 && loss() > 0.0;
     }
 
     // DESIGN section 7. `doubts` are those at the positions of the mesh.
@@ -434,7 +436,6 @@ class Pipeline {
         Extracted extracted = extract();
         const std::size_t unguessed = extracted.point.size();
         if (conceals()) conceal_missing(extracted, doubts_at(extracted.mesh.positions));
-        points_ = std::vector<Vector3d>();  // not asked for any more, and room for what follows
         result.mesh = to_model_frame(std::move(extracted.mesh));
         result.provenance.reserve(extracted.point.size());
         result.vertex_index.reserve(extracted.point.size());
@@ -494,7 +495,7 @@ class Pipeline {
     const ReceivedObject& object_;
     const ReconstructionOptions& options_;
     ObjectFrame frame_;
-    std::vector<Vector3d> points_;
+    std::vector<Vector3d> points_;  // as received, unit frame; none after the last settling
     std::optional<common::CoarseSurface> coarse_;
     common::TriangleMesh unwrapped_;
     PointSurface surface_;
