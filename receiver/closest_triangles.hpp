@@ -23,12 +23,12 @@ inline double squared_distance_to(const common::TriangleMesh& mesh, std::uint32_
     return (x - hit.point).squaredNorm();
 }
 
-/// Calls visit(i, hit) once for each point with its closest triangle, as TriangleTree::closest()
-/// says, from up to `threads` threads (0: one per core) and in any order. Points are taken
-/// along a Morton curve, so that what a search reads of a large mesh is still at hand, and
-/// near(triangle, x), with the triangle of the point before, gives the squared distance of some
-/// triangle as near to x as can be found quickly: that bounds the search. Requires a triangle and
-/// finite points.
+/// Calls visit(k, i, hit) once for each point i with its closest triangle, as
+/// TriangleTree::closest() says, from up to `threads` threads (0: one per core) and in any order. k
+/// is the point's place along a Morton curve, along which points are taken, so that what a search
+/// reads of a large mesh is still at hand, and near(triangle, x), with the triangle of the point
+/// before, gives the squared distance of some triangle as near to x as can be found quickly: that
+/// bounds the search. Requires a triangle and finite points.
 template <class Near, class Visit>
 void visit_closest_triangles(const common::TriangleMesh& mesh,
                              const std::vector<Eigen::Vector3d>& points, unsigned threads,
@@ -43,7 +43,7 @@ void visit_closest_triangles(const common::TriangleMesh& mesh,
             const Eigen::Vector3d& x = points[order[k]];
             const common::TriangleTree::Hit hit = tree.closest(x, kRounding * near(last, x));
             last = hit.triangle;
-            visit(order[k], hit);
+            visit(k, order[k], hit);
         }
     });
 }

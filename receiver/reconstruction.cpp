@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -117,9 +118,9 @@ class Pipeline {
         const bool all_in = first == points_.size() && left_out_.empty();
         settle(whole && all_in, all_in);
         if (all_in) return;
-        std::vector<std::uint32_t> rest(order.begin() + static_cast<std::ptrdiff_t>(first),
-                                        order.end());
-        rest.insert(rest.end(), left_out_.begin(), left_out_.end());
+        std::vector<std::uint32_t> rest;
+        std::merge(order.begin() + static_cast<std::ptrdiff_t>(first), order.end(),
+                   left_out_.begin(), left_out_.end(), std::back_inserter(rest));
         stage("insert");
         left_out_ = insert_points(surface_, points_, rest, options_.threads);
         settle(whole, true);

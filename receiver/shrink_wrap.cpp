@@ -62,7 +62,7 @@ void find_places(const SurfaceMesh& surface, const common::TriangleMesh& mesh,
             [&](std::uint32_t face, const Vector3d& x) {
                 return walk_to_closest(surface, face, x).squared_distance;
             },
-            [&](std::size_t i, const common::TriangleTree::Hit& hit) {
+            [&](std::size_t, std::size_t i, const common::TriangleTree::Hit& hit) {
                 pulls[i] = {hit.triangle, hit.barycentric, points[i] - hit.point};
             });
         return;

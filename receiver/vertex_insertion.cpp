@@ -48,8 +48,8 @@ std::vector<Target> project(const PointSurface& surface, std::span<const Vector3
         [&](std::uint32_t triangle, const Vector3d& x) {
             return walk_to_closest(surface.mesh, slot[triangle], x).squared_distance;
         },
-        [&](std::size_t i, const common::TriangleTree::Hit& hit) {
-            targets[i] = {chosen[i], slot[hit.triangle], hit.point};
+        [&](std::size_t k, std::size_t i, const common::TriangleTree::Hit& hit) {
+            targets[k] = {chosen[i], slot[hit.triangle], hit.point};
         });
     return targets;
 }
@@ -96,8 +96,11 @@ class Inserter {
 
   private:
     [[nodiscard]] std::optional<SurfacePlace> find(const Target& target) const {
-        if (regions_ == nullptr) return walk_to_closest(mesh_, target.face, target.at);
-        return walk_to_closest(mesh_, target.face, target.at, *regions_);
+        const FaceId start = target.face == last_face_ && last_vertex_ != kNone
+                                 ? SurfaceMesh::face_of(mesh_.outgoing(last_vertex_))
+                                 : target.face;
+        if (regions_ == nullptr) return walk_to_closest(mesh_, start, target.at);
+        return walk_to_closest(mesh_, start, target.at, *regions_);
     }
 
     void split(const SurfacePlace& place, const Target& target) {
@@ -119,6 +122,8 @@ class Inserter {
         if (v >= surface_.point_of_vertex.size()) surface_.point_of_vertex.resize(v + 1, kNone);
         surface_.point_of_vertex[v] = target.point;
         flip_around(v);
+        last_face_ = target.face;
+        last_vertex_ = v;
     }
 
     // Moving v to p must not turn any face at v over.
@@ -150,6 +155,8 @@ class Inserter {
     SurfaceMesh& mesh_;
     const MeshRegions* regions_ = nullptr;
     SurfaceMesh::Slots slots_;
+    FaceId last_face_ = kNone;      // of the last target that became a new vertex,
+    VertexId last_vertex_ = kNone;  // which the next one of that face is near
     std::vector<HalfedgeId> queue_;
     std::vector<std::uint32_t> left_out_;
     std::vector<Target> put_off_;
@@ -214,7 +221,9 @@ void insert_in_regions(PointSurface& surface, const MeshRegions& regions, unsign
 std::vector<std::uint32_t> insert_points(PointSurface& surface, std::span<const Vector3d> points,
                                          std::span<const std::uint32_t> chosen, unsigned threads) {
     std::vector<std::uint32_t> ascending(chosen.begin(), chosen.end());
-    std::sort(ascending.begin(), ascending.end());
+    if (!std::is_sorted(ascending.begin(), ascending.end())) {
+        std::sort(ascending.begin(), ascending.end());
+    }
     std::vector<Target> targets = project(surface, points, ascending, threads);
     sort_by_face(surface.mesh, targets);
     surface.mesh.reserve(targets.size());

@@ -30,7 +30,7 @@ TEST_CASE("every point is told its closest triangle once, on any number of threa
             [&](std::uint32_t last, const Vector3d& x) {
                 return squared_distance_to(mesh, last, x);
             },
-            [&](std::size_t i, const common::TriangleTree::Hit& hit) {
+            [&](std::size_t, std::size_t i, const common::TriangleTree::Hit& hit) {
                 ++visits[i];
                 hits[i] = hit;
             });
