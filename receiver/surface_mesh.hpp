@@ -85,12 +85,12 @@ class SurfaceMesh {
     [[nodiscard]] bool adjacent(VertexId a, VertexId b) const;
 
     /// 1-to-3 split: a new vertex at p inside f. f stays one of the three.
-    VertexId split_face(FaceId f, const Eigen::Vector3d& p) {
+    VertexId split_face(FaceId f, Eigen::Vector3d p) {  // which may be a position of the mesh
         grow();
         return split_face(f, p, slots_);
     }
     /// 2-to-4 split: a new vertex at p on h's edge. Both old faces stay among the four.
-    VertexId split_edge(HalfedgeId h, const Eigen::Vector3d& p) {
+    VertexId split_edge(HalfedgeId h, Eigen::Vector3d p) {
         grow();
         return split_edge(h, p, slots_);
     }
