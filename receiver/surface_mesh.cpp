@@ -127,17 +127,20 @@ void SurfaceMesh::give_back(Slots slots) {
     slots_.faces.insert(slots_.faces.end(), slots.faces.begin(), slots.faces.end());
 }
 
-void SurfaceMesh::grow() {
+const Eigen::Vector3d& SurfaceMesh::grow(const Eigen::Vector3d& p) {
     if (slots_.vertices.empty()) {
         slots_.vertices.push_back(static_cast<VertexId>(positions_.size()));
-        positions_.push_back(Eigen::Vector3d::Zero());
+        positions_.push_back(p);
         outgoing_.push_back(kNone);
+    } else {
+        positions_[slots_.vertices.back()] = p;
     }
     while (slots_.faces.size() < 2) {
         slots_.faces.insert(slots_.faces.begin(), static_cast<FaceId>(face_slots()));
         corners_.insert(corners_.end(), 3, kNone);
         twins_.insert(twins_.end(), 3, kNone);
     }
+    return positions_[slots_.vertices.back()];
 }
 
 VertexId SurfaceMesh::new_vertex(const Eigen::Vector3d& p, Slots& slots) {

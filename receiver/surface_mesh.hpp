@@ -85,14 +85,12 @@ class SurfaceMesh {
     [[nodiscard]] bool adjacent(VertexId a, VertexId b) const;
 
     /// 1-to-3 split: a new vertex at p inside f. f stays one of the three.
-    VertexId split_face(FaceId f, Eigen::Vector3d p) {  // which may be a position of the mesh
-        grow();
-        return split_face(f, p, slots_);
+    VertexId split_face(FaceId f, const Eigen::Vector3d& p) {
+        return split_face(f, grow(p), slots_);
     }
     /// 2-to-4 split: a new vertex at p on h's edge. Both old faces stay among the four.
-    VertexId split_edge(HalfedgeId h, Eigen::Vector3d p) {
-        grow();
-        return split_edge(h, p, slots_);
+    VertexId split_edge(HalfedgeId h, const Eigen::Vector3d& p) {
+        return split_edge(h, grow(p), slots_);
     }
     /// The same with slots of one's own, which must suffice.
     VertexId split_face(FaceId f, const Eigen::Vector3d& p, Slots& slots);
@@ -123,8 +121,9 @@ class SurfaceMesh {
   private:
     /// Sets the twins; false when an edge has not two half-edges of opposite directions.
     bool pair_halfedges();
-    /// Slots for one vertex and two faces more, where the mesh's own do not suffice.
-    void grow();
+    /// Slots for one vertex and two faces more, where the mesh's own do not suffice. Gives p where
+    /// it stays: p may be a position of the mesh, which growing moves.
+    const Eigen::Vector3d& grow(const Eigen::Vector3d& p);
     VertexId new_vertex(const Eigen::Vector3d& p, Slots& slots);
     static FaceId new_face(Slots& slots);
     void set_face(FaceId f, VertexId a, VertexId b, VertexId c);
