@@ -198,6 +198,7 @@ void insert_in_regions(PointSurface& surface, const MeshRegions& regions, unsign
     SurfaceMesh& mesh = surface.mesh;
     const std::vector<std::vector<std::uint32_t>> parts = by_region(regions, targets);
     std::vector<Inserter> inserters;
+    inserters.reserve(parts.size());
     for (const std::vector<std::uint32_t>& part : parts) {
         inserters.emplace_back(surface, regions, mesh.take_slots(part.size()));
     }

@@ -67,6 +67,7 @@ Outcome outcome_of(const ComparedModel& model, const std::vector<TimedDatagram>&
 std::vector<Outcome> outcomes_of(const ComparedModel& model, const CompareOptions& options) {
     const std::vector<TimedDatagram> stream = stretched(model.stream, kStream);
     std::vector<std::vector<TimedDatagram>> heard;
+    heard.reserve(std::size(kPositions) + options.seeds);
     for (const Position& position : kPositions) {
         heard.push_back(without_blackout(stream, position.begin, position.begin + kBlackout));
     }
