@@ -37,6 +37,14 @@ class MeshRegions {
     }
     /// Of a face that was there at construction.
     [[nodiscard]] std::size_t region_of(FaceId f) const { return number_[f]; }
+    /// Which of `count` things are each region's, ascending; face_of(i) says where one lies.
+    template <class FaceOf>
+    [[nodiscard]] std::vector<std::vector<std::uint32_t>> share_out(std::size_t count,
+                                                                    const FaceOf& face_of) const {
+        std::vector<std::vector<std::uint32_t>> shares(this->count());
+        for (std::uint32_t i = 0; i < count; ++i) shares[region_of(face_of(i))].push_back(i);
+        return shares;
+    }
     /// All corners of the face are inner vertices.
     [[nodiscard]] bool inner(FaceId f) const { return f >= border_.size() || border_[f] == 0; }
 

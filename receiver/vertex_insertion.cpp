@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "receiver/closest_triangles.hpp"
-#include "receiver/edge_flips.hpp"
 #include "receiver/mesh_regions.hpp"
+#include "receiver/region_surgery.hpp"
 #include "receiver/surface_walk.hpp"
 
 namespace ellicast::receiver {
@@ -54,13 +54,11 @@ std::vector<Target> project(const PointSurface& surface, std::span<const Vector3
     return targets;
 }
 
-// Where points go in. While several threads do that, each has a region, slots of its own, and puts
-// off what comes too near to another region.
+// Puts points in; off what comes too near to another region.
 class Inserter {
   public:
-    explicit Inserter(PointSurface& surface) : surface_(surface), mesh_(surface.mesh) {}
-    Inserter(PointSurface& surface, const MeshRegions& regions, SurfaceMesh::Slots slots)
-        : surface_(surface), mesh_(surface.mesh), regions_(&regions), slots_(std::move(slots)) {}
+    Inserter(PointSurface& surface, RegionSurgery surgery)
+        : surface_(surface), mesh_(surface.mesh), surgery_(std::move(surgery)) {}
 
     void insert(const Target& target) {
         const std::optional<SurfacePlace> place = find(target);
@@ -88,19 +86,14 @@ class Inserter {
     // Those that all but met an earlier one.
     [[nodiscard]] const std::vector<std::uint32_t>& left_out() const { return left_out_; }
     [[nodiscard]] const std::vector<Target>& put_off() const { return put_off_; }
-    // Edges that are to be looked at without regions; gives the slots back.
-    std::vector<HalfedgeId> finish() {
-        mesh_.give_back(std::move(slots_));
-        return std::move(put_off_edges_);
-    }
+    void finish() { surgery_.finish(); }
 
   private:
     [[nodiscard]] std::optional<SurfacePlace> find(const Target& target) const {
         const FaceId start = target.face == last_face_ && last_vertex_ != kNone
                                  ? SurfaceMesh::face_of(mesh_.outgoing(last_vertex_))
                                  : target.face;
-        if (regions_ == nullptr) return walk_to_closest(mesh_, start, target.at);
-        return walk_to_closest(mesh_, start, target.at, *regions_);
+        return surgery_.walk(start, target.at);
     }
 
     void split(const SurfacePlace& place, const Target& target) {
@@ -109,15 +102,13 @@ class Inserter {
         if (place.barycentric.minCoeff(&smallest) < kEdgeCoordinate) {
             const auto corner = static_cast<unsigned>((smallest + 1) % 3);
             const HalfedgeId h = SurfaceMesh::halfedge(place.face, corner);
-            if (regions_ != nullptr && !is_inner(mesh_, *regions_, h)) {
+            if (!surgery_.may_change(SurfaceMesh::face_of(mesh_.twin(h)))) {
                 put_off_.push_back(target);
                 return;
             }
-            v = regions_ == nullptr ? mesh_.split_edge(h, target.at)
-                                    : mesh_.split_edge(h, target.at, slots_);
+            v = surgery_.split_edge(h, target.at);
         } else {
-            v = regions_ == nullptr ? mesh_.split_face(place.face, target.at)
-                                    : mesh_.split_face(place.face, target.at, slots_);
+            v = surgery_.split_face(place.face, target.at);
         }
         if (v >= surface_.point_of_vertex.size()) surface_.point_of_vertex.resize(v + 1, kNone);
         surface_.point_of_vertex[v] = target.point;
@@ -144,23 +135,17 @@ class Inserter {
             queue_.push_back(SurfaceMesh::next(h));
             queue_.push_back(h);
         });
-        if (regions_ == nullptr) {
-            flip_to_delaunay(mesh_, queue_);
-        } else {
-            flip_to_delaunay(mesh_, queue_, *regions_, put_off_edges_);
-        }
+        surgery_.flip_to_delaunay(queue_);
     }
 
     PointSurface& surface_;
     SurfaceMesh& mesh_;
-    const MeshRegions* regions_ = nullptr;
-    SurfaceMesh::Slots slots_;
+    RegionSurgery surgery_;
     FaceId last_face_ = kNone;      // of the last target that became a new vertex,
     VertexId last_vertex_ = kNone;  // which the next one of that face is near
     std::vector<HalfedgeId> queue_;
     std::vector<std::uint32_t> left_out_;
     std::vector<Target> put_off_;
-    std::vector<HalfedgeId> put_off_edges_;
 };
 
 // How many targets each face slot has.
@@ -181,26 +166,17 @@ void sort_by_face(const SurfaceMesh& mesh, std::vector<Target>& targets) {
     targets = std::move(sorted);
 }
 
-// Places of the targets of each region, in the order of targets.
-std::vector<std::vector<std::uint32_t>> by_region(const MeshRegions& regions,
-                                                  std::span<const Target> targets) {
-    std::vector<std::vector<std::uint32_t>> parts(regions.count());
-    for (std::uint32_t i = 0; i < targets.size(); ++i) {
-        parts[regions.region_of(targets[i].face)].push_back(i);
-    }
-    return parts;
-}
-
 // Inserts what lies well within the regions, each of which a thread has; keeps the rest in
 // `targets`.
 void insert_in_regions(PointSurface& surface, const MeshRegions& regions, unsigned threads,
                        std::vector<Target>& targets, std::vector<std::uint32_t>& left_out) {
     SurfaceMesh& mesh = surface.mesh;
-    const std::vector<std::vector<std::uint32_t>> parts = by_region(regions, targets);
+    const std::vector<std::vector<std::uint32_t>> parts =
+        regions.share_out(targets.size(), [&](std::size_t i) { return targets[i].face; });
     std::vector<Inserter> inserters;
     inserters.reserve(parts.size());
     for (const std::vector<std::uint32_t>& part : parts) {
-        inserters.emplace_back(surface, regions, mesh.take_slots(part.size()));
+        inserters.emplace_back(surface, RegionSurgery(mesh, regions, mesh.take_slots(part.size())));
     }
     surface.point_of_vertex.resize(mesh.vertex_slots(), kNone);
     regions.for_each(threads, [&](std::size_t region) {
@@ -211,8 +187,7 @@ void insert_in_regions(PointSurface& surface, const MeshRegions& regions, unsign
         const auto& put_off = inserter.put_off();
         left.insert(left.end(), put_off.begin(), put_off.end());
         left_out.insert(left_out.end(), inserter.left_out().begin(), inserter.left_out().end());
-        std::vector<HalfedgeId> edges = inserter.finish();
-        flip_to_delaunay(mesh, edges);
+        inserter.finish();
     }
     targets = std::move(left);
 }
@@ -237,7 +212,7 @@ std::vector<std::uint32_t> insert_points(PointSurface& surface, std::span<const 
         if (regions.count() == 1) break;
         insert_in_regions(surface, regions, threads, targets, left_out);
     }
-    Inserter inserter(surface);
+    Inserter inserter(surface, RegionSurgery(surface.mesh));
     for (const Target& target : targets) inserter.insert(target);
     left_out.insert(left_out.end(), inserter.left_out().begin(), inserter.left_out().end());
     std::sort(left_out.begin(), left_out.end());

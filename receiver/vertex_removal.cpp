@@ -9,6 +9,7 @@
 
 #include "receiver/edge_flips.hpp"
 #include "receiver/mesh_regions.hpp"
+#include "receiver/region_surgery.hpp"
 
 namespace ellicast::receiver {
 namespace {
@@ -26,11 +27,10 @@ constexpr std::array<Bounds, 5> kPasses = {
 // Fewer vertices are removed before regions for that are found.
 constexpr std::size_t kWorthRegions = 2048;
 
-// While several threads remove, each has a region and leaves alone what comes too near to another.
+// Leaves alone what comes too near to another region.
 class Remover {
   public:
-    explicit Remover(SurfaceMesh& mesh) : mesh_(mesh) {}
-    Remover(SurfaceMesh& mesh, const MeshRegions& regions) : mesh_(mesh), regions_(&regions) {}
+    Remover(SurfaceMesh& mesh, RegionSurgery surgery) : mesh_(mesh), surgery_(std::move(surgery)) {}
 
     bool remove(VertexId v, const Bounds& bounds) {
         if (!may_touch(v)) return false;
@@ -50,38 +50,25 @@ class Remover {
         if (best == kNone) return false;
         ring_.clear();
         mesh_.for_each_outgoing(v, [&](HalfedgeId h) { ring_.push_back(mesh_.to_vertex(h)); });
-        if (regions_ == nullptr) {
-            mesh_.collapse(best);
-        } else {
-            mesh_.collapse(best, slots_);
-        }
+        surgery_.collapse(best);
         queue_.clear();
         for (const VertexId u : ring_) {
             mesh_.for_each_outgoing(u, [&](HalfedgeId h) { queue_.push_back(h); });
         }
-        if (regions_ == nullptr) {
-            flip_to_delaunay(mesh_, queue_);
-        } else {
-            flip_to_delaunay(mesh_, queue_, *regions_, put_off_);
-        }
+        surgery_.flip_to_delaunay(queue_);
         return true;
     }
 
-    // Edges that are to be looked at without regions; gives slots back.
-    std::vector<HalfedgeId> finish() {
-        mesh_.give_back(std::move(slots_));
-        return std::move(put_off_);
-    }
+    void finish() { surgery_.finish(); }
 
   private:
     // Its ring and all faces around that are those of one region.
     [[nodiscard]] bool may_touch(VertexId v) const {
-        if (regions_ == nullptr) return true;
         // Where v is at a border itself, its fan is not to be walked around.
-        bool may = regions_->inner(SurfaceMesh::face_of(mesh_.outgoing(v)));
+        bool may = surgery_.may_change(SurfaceMesh::face_of(mesh_.outgoing(v)));
         if (!may) return false;
         mesh_.for_each_outgoing(
-            v, [&](HalfedgeId h) { may = may && regions_->inner(SurfaceMesh::face_of(h)); });
+            v, [&](HalfedgeId h) { may = may && surgery_.may_change(SurfaceMesh::face_of(h)); });
         return may;
     }
 
@@ -115,31 +102,21 @@ class Remover {
     }
 
     SurfaceMesh& mesh_;
-    const MeshRegions* regions_ = nullptr;
-    SurfaceMesh::Slots slots_;
+    RegionSurgery surgery_;
     std::vector<VertexId> ring_;
     std::vector<HalfedgeId> queue_;
-    std::vector<HalfedgeId> put_off_;
 };
 
 // Removes those that the bounds allow and that lie well within a region.
 void remove_in_regions(SurfaceMesh& mesh, const MeshRegions& regions, unsigned threads,
                        const Bounds& bounds, std::vector<VertexId>& left) {
-    std::vector<std::vector<VertexId>> parts(regions.count());
-    for (const VertexId v : left) {
-        parts[regions.region_of(SurfaceMesh::face_of(mesh.outgoing(v)))].push_back(v);
-    }
-    std::vector<Remover> removers(regions.count(), Remover(mesh, regions));
+    const std::vector<std::vector<std::uint32_t>> parts = regions.share_out(
+        left.size(), [&](std::size_t i) { return SurfaceMesh::face_of(mesh.outgoing(left[i])); });
+    std::vector<Remover> removers(regions.count(), Remover(mesh, RegionSurgery(mesh, regions, {})));
     regions.for_each(threads, [&](std::size_t region) {
-        for (const VertexId v : parts[region]) removers[region].remove(v, bounds);
+        for (const std::uint32_t i : parts[region]) removers[region].remove(left[i], bounds);
     });
-    for (Remover& remover : removers) {
-        std::vector<HalfedgeId> edges = remover.finish();
-        std::erase_if(edges, [&](HalfedgeId h) {  // gone with a later vertex
-            return !mesh.face_alive(SurfaceMesh::face_of(h));
-        });
-        flip_to_delaunay(mesh, edges);
-    }
+    for (Remover& remover : removers) remover.finish();
     std::erase_if(left, [&](VertexId v) { return !mesh.vertex_alive(v); });
 }
 
@@ -157,7 +134,7 @@ std::size_t remove_vertices(SurfaceMesh& mesh, const std::function<bool(VertexId
         if (regions.count() == 1) break;
         remove_in_regions(mesh, regions, threads, kPasses[0], left);
     }
-    Remover remover(mesh);
+    Remover remover(mesh, RegionSurgery(mesh));
     for (const Bounds& bounds : kPasses) {
         // Flips and collapses of one pass open ways for others: repeat while it helps.
         for (bool progress = true; progress && !left.empty();) {

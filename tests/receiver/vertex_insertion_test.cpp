@@ -123,6 +123,8 @@ TEST_CASE("points go in on several threads as on one, where the surface is large
     REQUIRE(insert_points(two, points, all_of(points.size()), 3) == left_one);
     REQUIRE(one.point_of_vertex == two.point_of_vertex);
     REQUIRE(one.mesh.extract().triangles == two.mesh.extract().triangles);
+    // What one region did not need is another's.
+    REQUIRE(one.mesh.vertex_slots() == base.positions.size() + points.size());
     // All edges that were put off have been looked at.
     REQUIRE(flip_all_to_delaunay(one.mesh) * 1000 < points.size());
     REQUIRE(common::analyse_topology(one.mesh.extract()).euler == 2);
