@@ -8,6 +8,8 @@
 #include <string>
 #include <system_error>
 
+#include "common/file_descriptor.hpp"
+
 namespace ellicast::common {
 namespace {
 
@@ -17,42 +19,24 @@ namespace fs = std::filesystem;
     throw WriteFailure(std::generic_category().message(error));
 }
 
-// An open file that is closed whatever happens.
-class Descriptor {
-  public:
-    explicit Descriptor(int fd) : fd_(fd) {}
-    ~Descriptor() {
-        if (fd_ >= 0) ::close(fd_);
+void write(const FileDescriptor& file, std::string_view bytes) {
+    while (!bytes.empty()) {
+        const ::ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
+        if (written < 0 && errno == EINTR) continue;
+        if (written < 0) fail(errno);
+        bytes.remove_prefix(static_cast<std::size_t>(written));
     }
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
+}
 
-    [[nodiscard]] bool valid() const { return fd_ >= 0; }
-
-    void write(std::string_view bytes) const {
-        while (!bytes.empty()) {
-            const ::ssize_t written = ::write(fd_, bytes.data(), bytes.size());
-            if (written < 0 && errno == EINTR) continue;
-            if (written < 0) fail(errno);
-            bytes.remove_prefix(static_cast<std::size_t>(written));
-        }
-    }
-
-    void close() {  // some file systems report a full disk only here
-        const int fd = fd_;
-        fd_ = -1;
-        if (::close(fd) != 0) fail(errno);
-    }
-
-  private:
-    int fd_;
-};
+void close(FileDescriptor& file) {  // some file systems report a full disk only here
+    if (::close(file.release()) != 0) fail(errno);
+}
 
 void write_directly(const fs::path& path, std::string_view bytes) {
-    Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
     if (!file.valid()) fail(errno);
-    file.write(bytes);
-    file.close();
+    write(file, bytes);
+    close(file);
 }
 
 // A name nobody has: the process and a counter, tried exclusively.
@@ -66,13 +50,13 @@ void write_and_rename(const fs::path& path, std::string_view bytes) {
     constexpr int kAttempts = 100;
     for (int attempt = 0;; ++attempt) {
         const fs::path temporary = temporary_beside(path, attempt);
-        Descriptor file(
+        FileDescriptor file(
             ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode_t{0666}));
         if (!file.valid() && errno == EEXIST && attempt < kAttempts) continue;
         if (!file.valid()) fail(errno);
         try {
-            file.write(bytes);
-            file.close();
+            write(file, bytes);
+            close(file);
             if (::rename(temporary.c_str(), path.c_str()) != 0) fail(errno);
         } catch (const WriteFailure&) {
             ::unlink(temporary.c_str());

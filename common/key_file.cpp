@@ -10,6 +10,7 @@
 #include <optional>
 #include <system_error>
 
+#include "common/file_descriptor.hpp"
 #include "common/hex_text.hpp"
 
 namespace ellicast::common {
@@ -26,20 +27,6 @@ constexpr std::size_t kMostText = 1024;  // no key file is longer
     fail(path, std::generic_category().message(error));
 }
 
-class Descriptor {
-  public:
-    explicit Descriptor(int fd) : fd_(fd) {}
-    ~Descriptor() {
-        if (fd_ >= 0) ::close(fd_);
-    }
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    [[nodiscard]] int get() const { return fd_; }
-
-  private:
-    int fd_;
-};
-
 /// A file's text without blanks at its ends.
 struct KeyText {
     std::string text;
@@ -47,7 +34,7 @@ struct KeyText {
 };
 
 KeyText read_text(const fs::path& path) {
-    const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (file.get() < 0) fail(path, errno);
     struct stat status {};
     if (::fstat(file.get(), &status) != 0) fail(path, errno);
@@ -91,7 +78,7 @@ constexpr const char* kNotReplaced = "exists already; --force replaces it";
 /// Through a temporary file beside it, which only its owner can read from the start.
 void write_line(const fs::path& path, const std::string& hex, mode_t mode, bool replace) {
     std::string temporary = path.string() + ".XXXXXX";
-    const Descriptor file(::mkstemp(temporary.data()));
+    const FileDescriptor file(::mkstemp(temporary.data()));
     if (file.get() < 0) fail(path, errno);
     const auto give_up = [&](int error) {
         ::unlink(temporary.c_str());

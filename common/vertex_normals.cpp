@@ -1,7 +1,6 @@
 // common/vertex_normals.cpp
 #include "common/vertex_normals.hpp"
 
-#include <Eigen/Geometry>
 #include <cstddef>
 
 namespace ellicast::common {
@@ -14,8 +13,7 @@ std::vector<Vector3d> vertex_normals(const TriangleMesh& mesh) {
         for (std::size_t k = 0; k < 3; ++k) {
             const Vector3d u = mesh.positions[t[(k + 1) % 3]] - mesh.positions[t[k]];
             const Vector3d v = mesh.positions[t[(k + 2) % 3]] - mesh.positions[t[k]];
-            const double weight = u.squaredNorm() * v.squaredNorm();
-            if (weight > 0.0) normals[t[k]] += u.cross(v) / weight;
+            normals[t[k]] += corner_normal(u, v);
         }
     }
     for (Vector3d& n : normals) n.normalize();

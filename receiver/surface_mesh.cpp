@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/parallel.hpp"
+#include "common/vertex_normals.hpp"
 
 namespace ellicast::receiver {
 
@@ -375,10 +376,8 @@ Eigen::Vector3d vertex_normal(const SurfaceMesh& mesh, VertexId v) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     const Eigen::Vector3d& p = mesh.position(v);
     mesh.for_each_outgoing(v, [&](HalfedgeId h) {
-        const Eigen::Vector3d a = mesh.position(mesh.to_vertex(h)) - p;
-        const Eigen::Vector3d b = mesh.position(mesh.opposite(h)) - p;
-        const double weight = a.squaredNorm() * b.squaredNorm();
-        if (weight > 0.0) sum += a.cross(b) / weight;
+        sum += common::corner_normal(mesh.position(mesh.to_vertex(h)) - p,
+                                     mesh.position(mesh.opposite(h)) - p);
     });
     return sum.normalized();
 }
