@@ -24,8 +24,7 @@ struct FlipCriterion {
     std::span<const char> settled = {};
     /// Edges that stay.
     const FixedEdges* fixed = nullptr;
-    bool pairs = true;     // flip two at a time as well
-    unsigned threads = 0;  // 0: one per core; does not change the result
+    bool pairs = true;  // flip two at a time as well
 };
 
 /// What the two faces of an edge and the edges around it are worth: normals of the faces of h and
@@ -41,10 +40,9 @@ struct QuadCosts {
 /// 0.
 class FlipGains {
   public:
-    /// Reads all of the mesh once, which must outlive this.
+    /// Reads all of the mesh once, which must outlive this, on `threads` threads (0: one per core).
     FlipGains(SurfaceMesh& mesh, unsigned threads);
-    FlipGains(SurfaceMesh& mesh, const FlipCriterion& criterion)
-        : FlipGains(mesh, criterion.threads) {
+    FlipGains(SurfaceMesh& mesh, const FlipCriterion& criterion) : FlipGains(mesh, 0) {
         judge_by(criterion);
     }
 

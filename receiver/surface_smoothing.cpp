@@ -207,8 +207,9 @@ void SurfaceSmoother::set_doubtful(HalfedgeId h, char value) {
     std::atomic_ref(doubtful_[h]).store(value, std::memory_order_relaxed);
 }
 
-std::size_t flip_to_smooth(SurfaceMesh& mesh, const FlipCriterion& criterion, int passes) {
-    return SurfaceSmoother(mesh, criterion.threads).smooth(criterion, passes);
+std::size_t flip_to_smooth(SurfaceMesh& mesh, const FlipCriterion& criterion, int passes,
+                           unsigned threads) {
+    return SurfaceSmoother(mesh, threads).smooth(criterion, passes);
 }
 
 }  // namespace ellicast::receiver

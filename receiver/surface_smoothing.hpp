@@ -67,8 +67,8 @@ class SurfaceSmoother {
     std::vector<char> doubtful_;  // by half-edge: 0 or 1
 };
 
-/// A mesh smoothed by one criterion, on its `threads`.
+/// A mesh smoothed by one criterion, on `threads` threads (0: one per core).
 std::size_t flip_to_smooth(SurfaceMesh& mesh, const FlipCriterion& criterion = {},
-                           int passes = SurfaceSmoother::kPasses);
+                           int passes = SurfaceSmoother::kPasses, unsigned threads = 0);
 
 }  // namespace ellicast::receiver

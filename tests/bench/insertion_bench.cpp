@@ -132,7 +132,7 @@ void smooth(benchmark::State& state) {
         state.PauseTiming();
         mesh = delaunay;
         state.ResumeTiming();
-        flips = receiver::flip_to_smooth(mesh, {.threads = 1});
+        flips = receiver::flip_to_smooth(mesh, {}, receiver::SurfaceSmoother::kPasses, 1);
     }
     if (flips == 0 || !mesh.validate().empty()) {
         state.SkipWithError("no flip, or no surface any more");

@@ -13,7 +13,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
@@ -176,11 +175,7 @@ void rival_advancing_front(benchmark::State& state) {
         tests::received_positions(object_of(static_cast<std::size_t>(state.range(0))));
     run(state, [&] {
         const common::TriangleMesh mesh = tests::advancing_front(points);
-        std::vector<bool> used(points.size(), false);
-        for (const common::Triangle& t : mesh.triangles) {
-            for (const std::uint32_t v : t) used[v] = true;
-        }
-        const auto left = static_cast<std::size_t>(std::count(used.begin(), used.end(), false));
+        const std::size_t left = points.size() - tests::positions_used(mesh);
         Outcome outcome;
         outcome.vertices = static_cast<double>(points.size());
         outcome.right = 1000 * left <= points.size();

@@ -8,7 +8,6 @@
 // thousandth of the points for vertices; the rival's must use as many.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdlib>
@@ -84,11 +83,7 @@ void rival_advancing_front(benchmark::State& state) {
     const std::vector<Eigen::Vector3d> points = tests::received_positions(in.object);
     common::TriangleMesh mesh;
     for (auto _ : state) mesh = tests::advancing_front(points);
-    std::vector<bool> used(points.size(), false);
-    for (const common::Triangle& t : mesh.triangles) {
-        for (const std::uint32_t v : t) used[v] = true;
-    }
-    if (!nearly_all(static_cast<std::size_t>(std::count(used.begin(), used.end(), true)), in)) {
+    if (!nearly_all(tests::positions_used(mesh), in)) {
         state.SkipWithError("points left out");
         return;
     }

@@ -168,7 +168,7 @@ TEST_CASE("threads do not change what is flipped") {
             if (mesh.can_flip(h)) mesh.flip(h);
         }
         SurfaceMesh delaunay = mesh;
-        REQUIRE(flip_to_smooth(mesh, {.threads = threads}) > 100);
+        REQUIRE(flip_to_smooth(mesh, {}, SurfaceSmoother::kPasses, threads) > 100);
         REQUIRE(mesh.validate().empty());
         results.push_back(mesh.extract().triangles);
         REQUIRE(flip_all_to_delaunay(delaunay, threads) > 100);

@@ -50,4 +50,12 @@ common::TriangleMesh advancing_front(const std::vector<Eigen::Vector3d>& points)
     return mesh;
 }
 
+std::size_t positions_used(const common::TriangleMesh& mesh) {
+    std::vector<bool> used(mesh.positions.size(), false);
+    for (const common::Triangle& t : mesh.triangles) {
+        for (const std::uint32_t v : t) used[v] = true;
+    }
+    return static_cast<std::size_t>(std::count(used.begin(), used.end(), true));
+}
+
 }  // namespace ellicast::tests

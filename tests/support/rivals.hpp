@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "common/triangle_mesh.hpp"
@@ -12,5 +13,8 @@ namespace ellicast::tests {
 /// those given, in their order; points left out of the surface stay as unreferenced vertices.
 /// Orientation as it comes; the surface may have boundaries. Empty for points that span no volume.
 common::TriangleMesh advancing_front(const std::vector<Eigen::Vector3d>& points);
+
+/// How many positions some triangle has.
+std::size_t positions_used(const common::TriangleMesh& mesh);
 
 }  // namespace ellicast::tests
