@@ -39,4 +39,17 @@ void parallel_for(std::size_t count, unsigned threads, const Body& body) {
     }
 }
 
+/// What part(begin, end) says of each stretch of `size` items in [0, count), the last one shorter.
+/// Added up in this order, sums are the same on any number of threads.
+template <class Part>
+auto in_parts(std::size_t count, std::size_t size, unsigned threads, const Part& part) {
+    std::vector<decltype(part(std::size_t{}, std::size_t{}))> results((count + size - 1) / size);
+    parallel_for(results.size(), threads, [&](std::size_t first, std::size_t last) {
+        for (std::size_t k = first; k < last; ++k) {
+            results[k] = part(k * size, std::min(count, (k + 1) * size));
+        }
+    });
+    return results;
+}
+
 }  // namespace ellicast::common

@@ -388,23 +388,21 @@ double mean_edge_length(const SurfaceMesh& mesh, unsigned threads) {
         double sum = 0.0;
         std::size_t edges = 0;
     };
-    std::vector<Part> parts((mesh.face_slots() + kPart - 1) / kPart);
-    common::parallel_for(parts.size(), threads, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t part = begin; part < end; ++part) {
-            const std::size_t last = std::min(mesh.face_slots(), (part + 1) * kPart);
-            for (auto f = static_cast<FaceId>(part * kPart); f < last; ++f) {
-                if (!mesh.face_alive(f)) continue;
-                const auto [a, b, c] = mesh.face(f);
-                const Eigen::Vector3d& p = mesh.position(a);
-                const Eigen::Vector3d& q = mesh.position(b);
-                const Eigen::Vector3d& r = mesh.position(c);
-                parts[part].sum += (p - q).norm() + (q - r).norm() + (r - p).norm();
-                parts[part].edges += 3;
-            }
+    const auto measure = [&](std::size_t begin, std::size_t end) {
+        Part part;
+        for (auto f = static_cast<FaceId>(begin); f < end; ++f) {
+            if (!mesh.face_alive(f)) continue;
+            const auto [a, b, c] = mesh.face(f);
+            const Eigen::Vector3d& p = mesh.position(a);
+            const Eigen::Vector3d& q = mesh.position(b);
+            const Eigen::Vector3d& r = mesh.position(c);
+            part.sum += (p - q).norm() + (q - r).norm() + (r - p).norm();
+            part.edges += 3;
         }
-    });
+        return part;
+    };
     Part all;
-    for (const Part& part : parts) {
+    for (const Part& part : common::in_parts(mesh.face_slots(), kPart, threads, measure)) {
         all.sum += part.sum;
         all.edges += part.edges;
     }

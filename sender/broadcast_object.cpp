@@ -102,16 +102,17 @@ std::vector<Item> picked(const std::vector<Item>& items,
     return result;
 }
 
-/// The vertices' own indices by descending importance, backwards through the decimation of the
-/// solid. Where the solid has copies of a vertex, the most important one counts.
-std::vector<std::uint32_t> by_importance(const PreparedModel& model,
+/// The indices of the model's own vertices, the first of the solid, by descending importance:
+/// backwards through the decimation of the solid. Where that has copies of a vertex, the most
+/// important one counts.
+std::vector<std::uint32_t> by_importance(const common::TriangleMesh& solid, std::size_t own,
                                          const std::vector<std::uint32_t>& first_equal,
                                          unsigned threads) {
-    std::vector<std::uint32_t> removed = removal_order(model.solid, threads);
+    std::vector<std::uint32_t> removed = removal_order(solid, threads);
     std::reverse(removed.begin(), removed.end());
-    std::vector<bool> taken(model.vertices.size(), false);
+    std::vector<bool> taken(own, false);
     std::vector<std::uint32_t> ranking;
-    ranking.reserve(model.vertices.size());
+    ranking.reserve(own);
     for (const std::uint32_t index : removed) {
         const std::uint32_t vertex = first_equal[index];
         if (vertex >= taken.size() || taken[vertex]) continue;  // the centre of a cap, or a copy
@@ -122,60 +123,66 @@ std::vector<std::uint32_t> by_importance(const PreparedModel& model,
 }
 
 /// What becomes of the solid's positions: those of the model's vertices come first.
-std::vector<protocol::VertexRecord> solid_records(const PreparedModel& model,
+std::vector<protocol::VertexRecord> solid_records(const common::TriangleMesh& solid,
                                                   const std::array<double, 3>& origin) {
     std::vector<protocol::VertexRecord> records;
-    records.reserve(model.solid.positions.size());
-    for (const Eigen::Vector3d& x : model.solid.positions) {
+    records.reserve(solid.positions.size());
+    for (const Eigen::Vector3d& x : solid.positions) {
         records.push_back(vertex_record(x, origin));
     }
     return records;
 }
 
-/// Of the model's vertices with equal records the first ones, in the order asked for.
-std::vector<std::uint32_t> ordered_vertices(const PreparedModel& model,
-                                            const std::vector<protocol::VertexRecord>& records,
-                                            const std::vector<std::uint32_t>& first_equal,
+/// Of the model's own vertices with equal records the first ones, in the order asked for.
+std::vector<std::uint32_t> ordered_vertices(const common::TriangleMesh& solid, std::size_t own,
+                                            const VertexRecords& vertices,
                                             const ObjectOptions& options) {
-    std::vector<std::uint32_t> vertices;
+    std::vector<std::uint32_t> order;
     if (options.order == SendingOrder::importance) {
-        vertices = by_importance(model, first_equal, options.threads);
+        order = by_importance(solid, own, vertices.first_equal, options.threads);
     } else {
-        for (std::uint32_t v = 0; v < model.vertices.size(); ++v) {
-            if (first_equal[v] == v) vertices.push_back(v);
+        for (std::uint32_t v = 0; v < own; ++v) {
+            if (vertices.first_equal[v] == v) order.push_back(v);
         }
     }
-    const std::vector<Eigen::Vector3d> positions = positions_of(picked(records, vertices));
-    return picked(vertices, options.order == SendingOrder::importance
-                                ? spread_within_strata(positions, options.seed)
-                                : spread_order(positions, options.seed));
+    const std::vector<Eigen::Vector3d> positions = positions_of(picked(vertices.records, order));
+    return picked(order, options.order == SendingOrder::importance
+                             ? spread_within_strata(positions, options.seed)
+                             : spread_order(positions, options.seed));
 }
 
 // Strata below are too coarse for a mesh, and above the decimation takes its time.
 constexpr std::uint32_t kSmallestLevel = 512;
 constexpr std::uint32_t kLargestWithLevels = 1u << 18;
 
-/// `record_of`: by position of the solid.
-std::vector<protocol::EdgeRecord> edges_worth_telling(const PreparedModel& model,
-                                                      const std::vector<std::uint32_t>& record_of,
+/// The solid with the records' positions, and with those that no record has, centres of caps,
+/// behind them. `record_of`: by position of the solid, of which the first `own` have records.
+common::TriangleMesh sent_surface(common::TriangleMesh solid, std::size_t own,
+                                  std::vector<std::uint32_t> record_of,
+                                  const BroadcastObject& object) {
+    const Eigen::Map<const Eigen::Vector3d> origin(object.description.origin.data());
+    const std::vector<Eigen::Vector3d> centres(
+        solid.positions.begin() + static_cast<std::ptrdiff_t>(own), solid.positions.end());
+    solid.positions = {};
+    common::TriangleMesh surface{positions_of(object.vertices), std::move(solid.triangles)};
+    surface.positions.reserve(surface.positions.size() + centres.size());
+    for (std::size_t v = own; v < record_of.size(); ++v) {
+        record_of[v] = static_cast<std::uint32_t>(surface.positions.size());
+        surface.positions.push_back(centres[v - own] - origin);
+    }
+    for (common::Triangle& t : surface.triangles) {
+        t = {record_of[t[0]], record_of[t[1]], record_of[t[2]]};
+    }
+    std::erase_if(surface.triangles, [](const common::Triangle& t) {
+        return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    });
+    return surface;
+}
+
+std::vector<protocol::EdgeRecord> edges_worth_telling(common::TriangleMesh surface,
                                                       const BroadcastObject& object,
                                                       unsigned threads) {
     const auto vertices = static_cast<std::uint32_t>(object.vertices.size());
-    common::TriangleMesh surface{positions_of(object.vertices), {}};
-    std::vector<std::uint32_t> place = record_of;
-    for (std::size_t v = model.vertices.size(); v < place.size(); ++v) {  // the centres of caps
-        place[v] = static_cast<std::uint32_t>(surface.positions.size());
-        surface.positions.push_back(
-            model.solid.positions[v] -
-            Eigen::Map<const Eigen::Vector3d>(object.description.origin.data()));
-    }
-    surface.triangles.reserve(model.solid.triangles.size());
-    for (const common::Triangle& t : model.solid.triangles) {
-        const common::Triangle here{place[t[0]], place[t[1]], place[t[2]]};
-        if (here[0] != here[1] && here[1] != here[2] && here[2] != here[0]) {
-            surface.triangles.push_back(here);
-        }
-    }
     CostlyEdgeOptions options;
     options.threads = threads;
     options.normal_bits = object.hint.format.normal_bits;
@@ -190,36 +197,38 @@ std::vector<protocol::EdgeRecord> edges_worth_telling(const PreparedModel& model
 }
 
 /// Sets the rule for diagonals; says which normals are to be marked, if there are tags.
-std::vector<char> set_diagonals(BroadcastObject& object, const PreparedModel& model,
+std::vector<char> set_diagonals(VertexRecords& vertices, const common::TriangleMesh& solid,
                                 unsigned threads) {
-    const int normal_bits = object.hint.format.normal_bits;
-    const std::vector<Eigen::Vector3d> normals =
-        received_normals(model.solid, normal_bits, threads);
-    const Quads quads(model.solid, normals);
+    const int normal_bits = vertices.format.normal_bits;
+    const std::vector<Eigen::Vector3d> normals = received_normals(solid, normal_bits, threads);
+    const Quads quads(solid, normals, threads);
     static_assert(common::kDiagonalRules == protocol::kDiagonalRules);
-    object.hint.diagonals = best_diagonal_rule(model.solid, quads, normal_bits > 0, threads);
+    vertices.diagonals = best_diagonal_rule(solid, quads, normal_bits > 0, threads);
     if (normal_bits == 0) return {};
-    return diagonal_marks(model.solid, quads, object.hint.diagonals, threads);
+    return diagonal_marks(solid, quads, vertices.diagonals, threads);
 }
 
-/// Fills the object's records of vertices, and its edges. Requires format and rule for diagonals.
-void set_vertices(BroadcastObject& object, const PreparedModel& model,
-                  const std::vector<char>& marks, const ObjectOptions& options) {
-    const std::vector<protocol::VertexRecord> records =
-        solid_records(model, object.description.origin);
-    std::vector<std::uint32_t> record_of = first_equals(records.size(), [&](std::size_t k) {
-        const auto& [x, y, z] = records[k].position;
-        return std::array<double, 3>{x, y, z};
-    });
-    const std::vector<std::uint32_t> vertices =
-        ordered_vertices(model, records, record_of, options);
-    object.vertices = picked(records, vertices);
-    std::vector<std::uint32_t> rank(records.size(), 0);
-    for (std::uint32_t k = 0; k < vertices.size(); ++k) rank[vertices[k]] = k;
+/// Fills the object's records of vertices, and its edges. Requires origin, format and rule for
+/// diagonals. Gives up what it needs no more as soon as it can.
+void set_vertices(BroadcastObject& object, PreparedModel model, VertexRecords vertices,
+                  const ObjectOptions& options) {
+    const std::size_t own = std::exchange(model.vertices, {}).size();
+    if (!object.hint.format.ring) model.faces = {};
+    std::vector<std::uint32_t> order = ordered_vertices(model.solid, own, vertices, options);
+    object.vertices = picked(vertices.records, order);
+    vertices.records = {};
+    std::vector<std::uint32_t> rank(model.solid.positions.size(), 0);
+    for (std::uint32_t k = 0; k < order.size(); ++k) rank[order[k]] = k;
+    order = {};
+    std::vector<std::uint32_t> record_of = std::move(vertices.first_equal);
     for (std::uint32_t& v : record_of) v = rank[v];
-    set_tags(object.hint.format, model, record_of, marks, object.vertices);
-    if (options.tags.edges)
-        object.edges = edges_worth_telling(model, record_of, object, options.threads);
+    rank = {};
+    if (object.hint.format.ring) set_rings(model.faces, record_of, object.vertices);
+    model.faces = {};
+    if (!options.tags.edges) return;
+    common::TriangleMesh surface =
+        sent_surface(std::move(model.solid), own, std::move(record_of), object);
+    object.edges = edges_worth_telling(std::move(surface), object, options.threads);
 }
 
 /// The box of the records themselves: rounding happened before, so it holds every one of them
@@ -254,25 +263,37 @@ void check(const BroadcastObject& object) {
 
 }  // namespace
 
-BroadcastObject make_object(const PreparedModel& model, const ShapePromise& promise,
-                            const Decomposition& decomposition, const ObjectOptions& options) {
-    BroadcastObject object;
-    object.description.name = options.name;
-    object.description.sender_version = "ellicast " ELLICAST_VERSION;
-
+VertexRecords vertex_records(const PreparedModel& model, const ObjectOptions& options) {
+    VertexRecords vertices;
     const Eigen::AlignedBox3d box = common::bounding_box(model.vertices);
     const bool exact = all_are_floats(model.vertices);
     for (int axis = 0; axis < 3 && !box.isEmpty() && !exact; ++axis) {
-        object.description.origin[static_cast<std::size_t>(axis)] =
+        vertices.origin[static_cast<std::size_t>(axis)] =
             origin_on_axis(box.min()[axis], box.max()[axis]);
     }
-    const std::array<double, 3>& origin = object.description.origin;
+    vertices.format = record_format(options.tags, model);
+    const std::vector<char> marks = set_diagonals(vertices, model.solid, options.threads);
+    vertices.records = solid_records(model.solid, vertices.origin);
+    vertices.first_equal = first_equals(vertices.records.size(), [&](std::size_t k) {
+        const auto& [x, y, z] = vertices.records[k].position;
+        return std::array<double, 3>{x, y, z};
+    });
+    set_tags(vertices.format, model, vertices.first_equal, marks, vertices.records);
+    return vertices;
+}
 
+BroadcastObject make_object(PreparedModel model, VertexRecords vertices,
+                            const ShapePromise& promise, const Decomposition& decomposition,
+                            const ObjectOptions& options) {
+    BroadcastObject object;
+    object.description.name = options.name;
+    object.description.sender_version = "ellicast " ELLICAST_VERSION;
+    object.description.origin = vertices.origin;
     object.order = options.order;
-    object.hint.format = record_format(options.tags, model);
+    object.hint.format = vertices.format;
+    object.hint.diagonals = vertices.diagonals;
     object.hint.by_importance = options.order == SendingOrder::importance;
-    const std::vector<char> marks = set_diagonals(object, model, options.threads);
-    set_vertices(object, model, marks, options);
+    set_vertices(object, std::move(model), std::move(vertices), options);
 
     object.hint.components = promise.components;
     object.hint.euler_all = promise.euler_all;
@@ -283,7 +304,8 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     check(object);
 
     for (const common::Ellipsoid& ellipsoid : decomposition.ellipsoids) {
-        const protocol::EllipsoidRecord record = ellipsoid_record(ellipsoid, origin);
+        const protocol::EllipsoidRecord record =
+            ellipsoid_record(ellipsoid, object.description.origin);
         if (protocol::acceptable(record, object.hint)) object.ellipsoids.push_back(record);
     }
     if (object.ellipsoids.empty()) {
@@ -297,6 +319,12 @@ BroadcastObject make_object(const PreparedModel& model, const ShapePromise& prom
     object.id =
         protocol::object_id_of<common::Digest>(object.hint, object.ellipsoids, object.vertices);
     return object;
+}
+
+BroadcastObject make_object(PreparedModel model, const ShapePromise& promise,
+                            const Decomposition& decomposition, const ObjectOptions& options) {
+    VertexRecords vertices = vertex_records(model, options);
+    return make_object(std::move(model), std::move(vertices), promise, decomposition, options);
 }
 
 }  // namespace ellicast::sender

@@ -41,21 +41,29 @@ std::vector<Vector3d> known_to_receiver(const TriangleMesh& mesh, int bits, unsi
     return normals;
 }
 
+// Half-edges that are looked at together, whoever does it.
+constexpr std::size_t kPart = 1u << 15;
+
 // Between vertices below `among`, with their costs; those that cost nothing apart.
 std::vector<Candidate> candidates_of(const Quads& quads, std::uint32_t among, unsigned threads) {
-    std::vector<Candidate> candidates;
-    for (HalfEdge h = 0; h < quads.half_edges(); ++h) {
-        if (!quads.has_quad(h)) continue;
-        const std::array<std::uint32_t, 4> id = quads.ids(h);
-        if (std::max(id[0], id[1]) < among) candidates.push_back({0.0, h});
-    }
-    common::parallel_for(candidates.size(), threads, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            candidates[k].cost = quads.wrong_diagonal(candidates[k].half_edge);
+    const auto look = [&](std::size_t begin, std::size_t end) {
+        std::vector<Candidate> found;
+        for (auto h = static_cast<HalfEdge>(begin); h < end; ++h) {
+            if (!quads.has_quad(h)) continue;
+            const std::array<std::uint32_t, 4> id = quads.ids(h);
+            if (std::max(id[0], id[1]) >= among) continue;
+            const double cost = quads.wrong_diagonal(h);
+            if (cost > 0.0) found.push_back({cost, h});
         }
-    });
-    std::erase_if(candidates, [](const Candidate& c) { return !(c.cost > 0.0); });
-    return candidates;
+        return found;
+    };
+    std::vector<Candidate> all;
+    all.reserve(quads.half_edges() / 2);
+    for (auto& found : common::in_parts(quads.half_edges(), kPart, threads, look)) {
+        all.insert(all.end(), found.begin(), found.end());
+        found = {};  // so that they are not there twice
+    }
+    return all;
 }
 
 // Costs are cheap to tell; whether the receiver would get an edge wrong is asked of the costliest
@@ -64,7 +72,7 @@ std::vector<EdgeRecord> costliest(const TriangleMesh& mesh, std::uint32_t among,
                                   const CostlyEdgeOptions& options) {
     const std::vector<Vector3d> normals =
         known_to_receiver(mesh, options.normal_bits, options.threads);
-    const Quads quads(mesh, normals);
+    const Quads quads(mesh, normals, options.threads);
     const common::DiagonalWeights weights =
         common::diagonal_weights(options.diagonal_rule, options.normal_bits > 0, loss);
     const double unit = common::mean_edge_length(mesh);

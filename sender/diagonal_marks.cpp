@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -20,42 +21,125 @@ using Eigen::Vector3d;
 // mark coarsens a normal.
 constexpr double kLeastShare = 1e-4;
 
-// The edges of the solid, and what is known of each.
+// Of more half-edges, evenly chosen ones tell what all mistakes add.
+constexpr std::size_t kMostHalfEdges = 1u << 19;
+
+// Half-edges that are looked at together, whoever does it.
+constexpr std::size_t kPart = 1u << 13;
+
+/// What is known of some edges of the solid.
 struct Edges {
     std::vector<HalfEdge> half_edge;
     std::vector<double> gain;  // of the other diagonal by the rule, in mean edge lengths
     std::vector<double> cost;  // when the receiver takes the other one
 };
 
-Edges edges_of(const TriangleMesh& solid, const Quads& quads, std::uint8_t rule, unsigned threads) {
-    const double unit = common::mean_edge_length(solid);
-    const common::DiagonalWeights weights = common::diagonal_weights(rule, true, 0.0);
-    Edges edges;
-    edges.half_edge.reserve(quads.half_edges() / 2);
-    for (HalfEdge h = 0; h < quads.half_edges(); ++h) {
-        if (quads.has_quad(h)) edges.half_edge.push_back(h);
-    }
-    edges.gain.resize(edges.half_edge.size());
-    edges.cost.resize(edges.half_edge.size());
-    common::parallel_for(edges.gain.size(), threads, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t e = begin; e < end; ++e) {
-            const HalfEdge h = edges.half_edge[e];
-            edges.gain[e] = common::weighed_diagonal_gain(quads.quad(h), weights, unit) / unit;
-            edges.cost[e] = quads.wrong_diagonal(h);
-        }
-    });
-    return edges;
-}
+/// Which diagonals a receiver without marks gets wrong.
+class Guesses {
+  public:
+    Guesses(const TriangleMesh& solid, const Quads& quads, std::uint8_t rule, unsigned threads)
+        : quads_(quads),
+          weights_(common::diagonal_weights(rule, true, 0.0)),
+          unit_(common::mean_edge_length(solid)),
+          threads_(threads) {}
 
+    /// What a mistake must cost to count.
+    [[nodiscard]] double least_cost() const {
+        const std::size_t step = std::max<std::size_t>(1, quads_.half_edges() / kMostHalfEdges);
+        const auto cost_of = [&](std::size_t begin, std::size_t end) {
+            double cost = 0.0;
+            for (std::size_t i = begin; i < end; i += step) {
+                const auto h = static_cast<HalfEdge>(i);
+                if (quads_.has_quad(h) && is_wrong(gain(h))) cost += quads_.wrong_diagonal(h);
+            }
+            return cost;
+        };
+        const std::vector<double> costs =
+            common::in_parts(quads_.half_edges(), step * kPart, threads_, cost_of);
+        const double sum = std::accumulate(costs.begin(), costs.end(), 0.0);
+        return kLeastShare * static_cast<double>(step) * sum;
+    }
+
+    /// Ascending; those that cost at least so much, and something.
+    [[nodiscard]] std::vector<HalfEdge> costly_mistakes(double least) const {
+        return chosen([&](HalfEdge h) {
+            const double cost = quads_.wrong_diagonal(h);
+            return cost > 0.0 && cost >= least && is_wrong(gain(h));
+        });
+    }
+
+    /// Of the edges whose quads have one of these vertices, by half-edge.
+    [[nodiscard]] Edges around(const std::vector<bool>& vertices) const {
+        Edges edges;
+        edges.half_edge = chosen([&](HalfEdge h) {
+            const std::array<std::uint32_t, 4> id = quads_.ids(h);
+            return std::any_of(id.begin(), id.end(), [&](auto v) { return vertices[v]; });
+        });
+        edges.gain.resize(edges.half_edge.size());
+        edges.cost.resize(edges.half_edge.size());
+        common::parallel_for(edges.gain.size(), threads_, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t e = begin; e < end; ++e) {
+                edges.gain[e] = gain(edges.half_edge[e]);
+                edges.cost[e] = quads_.wrong_diagonal(edges.half_edge[e]);
+            }
+        });
+        return edges;
+    }
+
+    static bool is_wrong(double gain) { return gain > common::kLeastDiagonalGain; }
+
+  private:
+    [[nodiscard]] double gain(HalfEdge h) const {
+        return common::weighed_diagonal_gain(quads_.quad(h), weights_, unit_) / unit_;
+    }
+
+    template <class Wanted>
+    [[nodiscard]] std::vector<HalfEdge> chosen(const Wanted& wanted) const {
+        const auto look = [&](std::size_t begin, std::size_t end) {
+            std::vector<HalfEdge> found;
+            for (auto h = static_cast<HalfEdge>(begin); h < end; ++h) {
+                if (quads_.has_quad(h) && wanted(h)) found.push_back(h);
+            }
+            return found;
+        };
+        std::vector<HalfEdge> all;
+        for (const auto& found : common::in_parts(quads_.half_edges(), kPart, threads_, look)) {
+            all.insert(all.end(), found.begin(), found.end());
+        }
+        return all;
+    }
+
+    const Quads& quads_;
+    common::DiagonalWeights weights_;
+    double unit_;
+    unsigned threads_;
+};
+
+/// Tries marks on the costliest edges first.
 class Marking {
   public:
-    Marking(std::size_t vertices, const Quads& quads, const Edges& edges, double weight)
-        : weight_(weight),
-          quads_(quads),
-          edges_(edges),
-          marks_(vertices, 0),
-          suspects_(wrong_and_costly()),
-          quads_at_(corners_in_quads()) {}
+    Marking(std::size_t vertices, const Quads& quads, const Guesses& guesses, double weight)
+        : weight_(weight), quads_(quads), marks_(vertices, 0), least_(guesses.least_cost()) {
+        const std::vector<HalfEdge> mistakes = guesses.costly_mistakes(least_);
+        std::vector<bool> asked(vertices, false);
+        for (const HalfEdge h : mistakes) {
+            const std::array<std::uint32_t, 4> id = quads_.ids(h);
+            asked[id[0]] = asked[id[1]] = true;
+        }
+        edges_ = guesses.around(asked);
+        for (std::uint32_t e = 0; e < edges_.gain.size(); ++e) {
+            if (std::binary_search(mistakes.begin(), mistakes.end(), edges_.half_edge[e])) {
+                suspects_.push_back(e);
+            }
+            for (const std::uint32_t v : ids(e)) {
+                if (asked[v]) quads_at_.emplace_back(v, e);
+            }
+        }
+        std::sort(quads_at_.begin(), quads_at_.end());
+        std::stable_sort(suspects_.begin(), suspects_.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return edges_.cost[a] > edges_.cost[b];
+        });
+    }
 
     std::vector<char> run() {
         for (const std::uint32_t e : suspects_) try_marking(e);
@@ -63,42 +147,8 @@ class Marking {
     }
 
   private:
-    // Those that count, the costliest first. Sets least_.
-    std::vector<std::uint32_t> wrong_and_costly() {
-        std::vector<std::uint32_t> wrong;
-        for (std::uint32_t e = 0; e < edges_.gain.size(); ++e) {
-            if (cost(e) > 0.0) wrong.push_back(e);
-        }
-        std::stable_sort(wrong.begin(), wrong.end(), [&](std::uint32_t a, std::uint32_t b) {
-            return edges_.cost[a] > edges_.cost[b];
-        });
-        for (const std::uint32_t e : wrong) least_ += kLeastShare * edges_.cost[e];
-        const auto cheap = std::find_if(wrong.begin(), wrong.end(),
-                                        [&](std::uint32_t e) { return edges_.cost[e] < least_; });
-        wrong.erase(cheap, wrong.end());
-        return wrong;
-    }
-
     // A corner of an edge's quad: vertex, edge.
     using Corner = std::pair<std::uint32_t, std::uint32_t>;
-
-    // By vertex, then edge, of the vertices that may be marked: few, so that what is asked of the
-    // quads around them takes little memory.
-    [[nodiscard]] std::vector<Corner> corners_in_quads() const {
-        std::vector<bool> asked(marks_.size(), false);
-        for (const std::uint32_t e : suspects_) {
-            const std::array<std::uint32_t, 4> id = ids(e);
-            asked[id[0]] = asked[id[1]] = true;
-        }
-        std::vector<Corner> corners;
-        for (std::uint32_t e = 0; e < edges_.gain.size(); ++e) {
-            for (const std::uint32_t v : ids(e)) {
-                if (asked[v]) corners.emplace_back(v, e);
-            }
-        }
-        std::sort(corners.begin(), corners.end());
-        return corners;
-    }
 
     [[nodiscard]] std::array<std::uint32_t, 4> ids(std::uint32_t e) const {
         return quads_.ids(edges_.half_edge[e]);
@@ -112,7 +162,7 @@ class Marking {
     [[nodiscard]] double cost(std::uint32_t e) const {
         const auto [a, b, c, d] = ids(e);
         const double gain = edges_.gain[e] + weight_ * (int{marked(c, d)} - int{marked(a, b)});
-        return gain > common::kLeastDiagonalGain ? edges_.cost[e] : 0.0;
+        return Guesses::is_wrong(gain) ? edges_.cost[e] : 0.0;
     }
 
     // Of all quads that one of the two vertices has a part in.
@@ -143,11 +193,11 @@ class Marking {
 
     double weight_;  // of a mark, in mean edge lengths
     const Quads& quads_;
-    const Edges& edges_;
     std::vector<char> marks_;
-    double least_ = 0.0;                   // what a mistake must cost
-    std::vector<std::uint32_t> suspects_;  // edges
-    std::vector<Corner> quads_at_;
+    double least_;                         // what a mistake must cost
+    Edges edges_;                          // around those that may be marked
+    std::vector<std::uint32_t> suspects_;  // of these, the costliest first
+    std::vector<Corner> quads_at_;         // by vertex, then edge, of those that may be marked
 };
 
 }  // namespace
@@ -155,14 +205,14 @@ class Marking {
 std::vector<char> diagonal_marks(const TriangleMesh& solid, int normal_bits, std::uint8_t rule,
                                  unsigned threads) {
     const std::vector<Vector3d> normals = received_normals(solid, normal_bits, threads);
-    return diagonal_marks(solid, Quads(solid, normals), rule, threads);
+    return diagonal_marks(solid, Quads(solid, normals, threads), rule, threads);
 }
 
 std::vector<char> diagonal_marks(const TriangleMesh& solid, const Quads& quads, std::uint8_t rule,
                                  unsigned threads) {
     const double weight = common::diagonal_weights(rule, true, 0.0).mark;
-    const Edges edges = edges_of(solid, quads, rule, threads);
-    return Marking(solid.positions.size(), quads, edges, weight).run();
+    const Guesses guesses(solid, quads, rule, threads);
+    return Marking(solid.positions.size(), quads, guesses, weight).run();
 }
 
 }  // namespace ellicast::sender

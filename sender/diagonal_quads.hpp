@@ -48,13 +48,14 @@ inline std::vector<Eigen::Vector3d> decoded_normals(const common::TriangleMesh& 
 }
 
 /// The half-edge on the other side of each; kNone where there is not exactly one.
-inline std::vector<HalfEdge> twins_of(const common::TriangleMesh& mesh) {
+inline std::vector<HalfEdge> twins_of(const common::TriangleMesh& mesh, unsigned threads) {
     std::vector<HalfEdge> twins(3 * mesh.triangles.size(), kNone);
-    for_each_edge(mesh.triangles, mesh.positions.size(), [&](std::span<const HalfEdge> edge) {
+    const auto join = [&](std::span<const HalfEdge> edge) {
         if (edge.size() != 2) return;
         twins[edge[0]] = edge[1];
         twins[edge[1]] = edge[0];
-    });
+    };
+    for_each_edge(mesh.triangles, mesh.positions.size(), join, threads);
     return twins;
 }
 
@@ -70,8 +71,9 @@ inline std::vector<Eigen::Vector3d> received_normals(const common::TriangleMesh&
 /// outlive it. Memory: 12 bytes a triangle.
 class Quads {
   public:
-    Quads(const common::TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& normals)
-        : mesh_(mesh), normals_(normals), twins_(twins_of(mesh)) {}
+    Quads(const common::TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& normals,
+          unsigned threads)
+        : mesh_(mesh), normals_(normals), twins_(twins_of(mesh, threads)) {}
 
     [[nodiscard]] std::size_t half_edges() const { return twins_.size(); }
 

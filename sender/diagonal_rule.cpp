@@ -25,7 +25,7 @@ constexpr std::size_t kPart = 1u << 13;
 std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, int normal_bits,
                                 unsigned threads) {
     const std::vector<Eigen::Vector3d> normals = received_normals(solid, normal_bits, threads);
-    return best_diagonal_rule(solid, Quads(solid, normals), normal_bits > 0, threads);
+    return best_diagonal_rule(solid, Quads(solid, normals, threads), normal_bits > 0, threads);
 }
 
 std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, const Quads& quads, bool tagged,
@@ -37,25 +37,22 @@ std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, const Quads& 
     }
     const std::size_t step = std::max<std::size_t>(1, 3 * solid.triangles.size() / kMostHalfEdges);
     using Costs = std::array<double, common::kDiagonalRules>;
-    std::vector<Costs> parts((quads.half_edges() + step * kPart - 1) / (step * kPart), Costs{});
-    common::parallel_for(parts.size(), threads, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t part = begin; part < end; ++part) {
-            const std::size_t last = std::min(quads.half_edges(), (part + 1) * step * kPart);
-            for (std::size_t i = part * step * kPart; i < last; i += step) {
-                const auto h = static_cast<HalfEdge>(i);
-                if (!quads.has_quad(h)) continue;
-                const common::DiagonalGain gain = common::diagonal_gain(quads.quad(h));
-                const double wrong = quads.wrong_diagonal(h);
-                for (std::size_t rule = 0; rule < common::kDiagonalRules; ++rule) {
-                    const double gained =
-                        gain.weighed(weights[rule].angle, weights[rule].rise, unit);
-                    if (gained > common::kLeastDiagonalGain * unit) parts[part][rule] += wrong;
-                }
+    const auto cost_of = [&](std::size_t begin, std::size_t end) {
+        Costs costs{};
+        for (std::size_t i = begin; i < end; i += step) {
+            const auto h = static_cast<HalfEdge>(i);
+            if (!quads.has_quad(h)) continue;
+            const common::DiagonalGain gain = common::diagonal_gain(quads.quad(h));
+            const double wrong = quads.wrong_diagonal(h);
+            for (std::size_t rule = 0; rule < common::kDiagonalRules; ++rule) {
+                const double gained = gain.weighed(weights[rule].angle, weights[rule].rise, unit);
+                if (gained > common::kLeastDiagonalGain * unit) costs[rule] += wrong;
             }
         }
-    });
+        return costs;
+    };
     Costs cost{};
-    for (const Costs& part : parts) {
+    for (const Costs& part : common::in_parts(quads.half_edges(), step * kPart, threads, cost_of)) {
         for (std::size_t rule = 0; rule < cost.size(); ++rule) cost[rule] += part[rule];
     }
     return static_cast<std::uint8_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "common/parallel.hpp"
 #include "common/triangle_mesh.hpp"
 
 namespace ellicast::sender {
@@ -49,32 +50,34 @@ struct Buckets {
     }
 };
 
-/// Calls visit(span of half-edges) once for every undirected edge, in ascending order of its two
-/// ends; the half-edges come in ascending order. Triangles must have three different corners. About
-/// linear.
+/// Calls visit(span of half-edges) once for every undirected edge; the half-edges come in ascending
+/// order. On one thread edges come in ascending order of their two ends, on several (0: one per
+/// core) many at one time. Triangles must have three different corners. About linear.
 template <class Visit>
 void for_each_edge(const std::vector<common::Triangle>& triangles, std::size_t vertices,
-                   const Visit& visit) {
+                   const Visit& visit, unsigned threads = 1) {
     const auto lower = [&](std::size_t h) {
         const auto half = static_cast<HalfEdge>(h);
         return std::min(origin(triangles, half), target(triangles, half));
     };
     Buckets by_lower(3 * triangles.size(), vertices, lower);
-    std::vector<std::uint64_t> keys;  // upper end << 32 | half-edge
-    for (std::size_t v = 0; v < vertices; ++v) {
-        const std::span<HalfEdge> edges = by_lower.bucket(v);
-        keys.clear();
-        for (const HalfEdge h : edges) {
-            const std::uint32_t upper = std::max(origin(triangles, h), target(triangles, h));
-            keys.push_back(std::uint64_t{upper} << 32 | h);
+    common::parallel_for(vertices, threads, [&](std::size_t first, std::size_t last) {
+        std::vector<std::uint64_t> keys;  // upper end << 32 | half-edge
+        for (std::size_t v = first; v < last; ++v) {
+            const std::span<HalfEdge> edges = by_lower.bucket(v);
+            keys.clear();
+            for (const HalfEdge h : edges) {
+                const std::uint32_t upper = std::max(origin(triangles, h), target(triangles, h));
+                keys.push_back(std::uint64_t{upper} << 32 | h);
+            }
+            std::sort(keys.begin(), keys.end());
+            for (std::size_t k = 0; k < keys.size(); ++k) edges[k] = static_cast<HalfEdge>(keys[k]);
+            for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
+                while (end < keys.size() && keys[end] >> 32 == keys[begin] >> 32) ++end;
+                visit(std::span<const HalfEdge>(edges.subspan(begin, end - begin)));
+            }
         }
-        std::sort(keys.begin(), keys.end());
-        for (std::size_t k = 0; k < keys.size(); ++k) edges[k] = static_cast<HalfEdge>(keys[k]);
-        for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
-            while (end < keys.size() && keys[end] >> 32 == keys[begin] >> 32) ++end;
-            visit(std::span<const HalfEdge>(edges.subspan(begin, end - begin)));
-        }
-    }
+    });
 }
 
 /// Disjoint sets whose representative is the smallest member.

@@ -1,6 +1,7 @@
 // sender/model_loading.cpp
 #include "sender/model_loading.hpp"
 
+#include <future>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -34,27 +35,27 @@ std::optional<fs::path> usable(const std::optional<fs::path>& cache,
     return std::nullopt;
 }
 
-struct Decomposed {
-    PreparedModel model;
-    Decomposition decomposition;
-    std::string key;
-};
-
 PreparedModel prepared(const fs::path& path, LoadedModel& loaded) {
-    const common::TriangleMesh input =
+    common::TriangleMesh input =
         timed(loaded.stages, "read", [&] { return common::read_model(path); });
-    PreparedModel model = timed(loaded.stages, "prepare",
-                                [&] { return naming(path, [&] { return prepare_model(input); }); });
+    PreparedModel model = timed(loaded.stages, "prepare", [&] {
+        return naming(path, [&] { return prepare_model(std::move(input)); });
+    });
+    loaded.path = path;
     loaded.warnings = model.warnings;
     return model;
 }
 
+struct Decomposed {
+    Decomposition decomposition;
+    std::string key;
+};
+
 /// From the cache, or computed and then cached.
-Decomposed decomposed(const fs::path& path, const DecompositionOptions& options,
+Decomposed decomposed(const common::TriangleMesh& solid, const DecompositionOptions& options,
                       const std::optional<fs::path>& cache, LoadedModel& loaded) {
     Decomposed result;
-    result.model = prepared(path, loaded);
-    result.key = decomposition_key(result.model.solid, options);
+    result.key = decomposition_key(solid, options);
     const std::optional<fs::path> directory = usable(cache, loaded.warnings);
     const fs::path file = directory.value_or(fs::path()) / (result.key + ".ellipsoids");
     if (directory) {
@@ -65,7 +66,7 @@ Decomposed decomposed(const fs::path& path, const DecompositionOptions& options,
     }
     if (!loaded.cached) {
         result.decomposition = timed(loaded.stages, "decompose", [&] {
-            return naming(path, [&] { return decompose(result.model.solid, options); });
+            return naming(loaded.path, [&] { return decompose(solid, options); });
         });
     }
     if (directory && !loaded.cached) {
@@ -75,7 +76,6 @@ Decomposed decomposed(const fs::path& path, const DecompositionOptions& options,
             loaded.warnings.push_back("not cached: " + std::string(error.what()));
         }
     }
-    loaded.path = path;
     loaded.decomposition = result.decomposition;
     loaded.decomposition.ellipsoids.clear();
     return result;
@@ -87,13 +87,22 @@ LoadedModel load_model(const fs::path& path, const DecompositionOptions& options
                        const std::optional<fs::path>& cache, const TagOptions& tags,
                        SendingOrder order) {
     LoadedModel loaded;
-    const Decomposed source = decomposed(path, options, cache, loaded);
-    loaded.promise = timed(loaded.stages, "promise",
-                           [&] { return promise_topology(source.model, options.threads); });
+    PreparedModel model = prepared(path, loaded);
+    const ObjectOptions object_options{path.stem().string(), options.seed, tags, order,
+                                       options.threads};
+    // Neither needs the other, and of each a part is for one thread.
+    std::future<VertexRecords> records = std::async(
+        options.threads == 1 ? std::launch::deferred : std::launch::async,
+        [&] { return naming(path, [&] { return vertex_records(model, object_options); }); });
+    const Decomposition decomposition =
+        decomposed(model.solid, options, cache, loaded).decomposition;
+    loaded.promise =
+        timed(loaded.stages, "promise", [&] { return promise_topology(model, options.threads); });
+    VertexRecords vertices = timed(loaded.stages, "records", [&] { return records.get(); });
     loaded.object = timed(loaded.stages, "object", [&] {
         return naming(path, [&] {
-            return make_object(source.model, loaded.promise, source.decomposition,
-                               {path.stem().string(), options.seed, tags, order, options.threads});
+            return make_object(std::move(model), std::move(vertices), loaded.promise, decomposition,
+                               object_options);
         });
     });
     if (loaded.promise.approximate) {
@@ -105,8 +114,9 @@ LoadedModel load_model(const fs::path& path, const DecompositionOptions& options
 LoadedModel decompose_to_file(const fs::path& path, const DecompositionOptions& options,
                               const std::optional<fs::path>& cache, const fs::path& output) {
     LoadedModel loaded;
-    const Decomposed source = decomposed(path, options, cache, loaded);
-    write_decomposition(output, source.key, source.decomposition);
+    const PreparedModel model = prepared(path, loaded);
+    const Decomposed result = decomposed(model.solid, options, cache, loaded);
+    write_decomposition(output, result.key, result.decomposition);
     return loaded;
 }
 

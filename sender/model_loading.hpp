@@ -23,8 +23,10 @@ struct LoadedModel {
     Decomposition decomposition;             // without the ellipsoids: those are in the object
     bool cached = false;                     // the decomposition was found, not computed
     std::optional<Certificate> certificate;  // when one was asked for and the topology is promised
-    std::vector<StageTime> stages;           // read, prepare, cache, decompose, promise, object
-    std::vector<std::string> warnings;       // of preparation, cache and promise
+    /// read, prepare, cache, decompose, promise, records, object. The vertices' records are made
+    /// from the end of prepare on, beside what comes next: "records" is what was left to wait for.
+    std::vector<StageTime> stages;
+    std::vector<std::string> warnings;  // of preparation, cache and promise
 };
 
 /// Reads a model file, prepares and decomposes it, and makes its object, which is named after the

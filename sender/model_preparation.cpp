@@ -76,9 +76,9 @@ void turn_like(const common::TriangleMesh& solid, const std::vector<Eigen::Vecto
 
 }  // namespace
 
-PreparedModel prepare_model(const common::TriangleMesh& input) {
+PreparedModel prepare_model(common::TriangleMesh input) {
     if (input.triangles.empty()) throw std::invalid_argument("the model has no faces");
-    CleanTriangles clean = clean_triangles(input);
+    CleanTriangles clean = clean_triangles(std::move(input));
     if (clean.mesh.triangles.empty()) {
         throw std::invalid_argument("the model has no faces (all are degenerate)");
     }

@@ -36,8 +36,9 @@ struct PreparedModel {
 /// the file has it. One-sided surfaces (Moebius) are cut open. Two faces with the same corners that
 /// look opposite ways cancel, unless a whole part is doubled so: then one side stays. Throws
 /// std::invalid_argument with a one-line reason when nothing with a volume remains: no faces, all
-/// degenerate, |volume| below 1e-9 of the cubed diagonal. Cost: linear up to a sort.
-PreparedModel prepare_model(const common::TriangleMesh& input);
+/// degenerate, |volume| below 1e-9 of the cubed diagonal. Cost: linear up to a sort. The input is
+/// used up on the way, so that a large one is not there twice.
+PreparedModel prepare_model(common::TriangleMesh input);
 
 /// What the hint says of the shape.
 struct ShapePromise {

@@ -92,18 +92,22 @@ std::vector<std::uint32_t> removal_order(const common::TriangleMesh& surface, un
             decimate_ranges(mesh, static_cast<std::uint32_t>(size), threads, removals);
         }
     }
-    RangeDecimation whole(mesh, 0, mesh.size());
     std::vector<Removal> last;
-    whole.remove(Allowed::good_shape, 0, last);
+    std::vector<Removal> rest;
+    {
+        RangeDecimation whole(mesh, 0, mesh.size());
+        whole.remove(Allowed::good_shape, 0, last);
+        whole.remove(Allowed::same_topology, 0, rest);
+        whole.remove(Allowed::anything, 0, rest);
+    }
     if (!removals.empty()) {
         make_ascending(last);
         removals.insert(removals.end(), last.begin(), last.end());
         sort_by_cost(removals);
         last.clear();
     }
-    whole.remove(Allowed::same_topology, 0, last);
-    whole.remove(Allowed::anything, 0, last);
     removals.insert(removals.end(), last.begin(), last.end());
+    removals.insert(removals.end(), rest.begin(), rest.end());
 
     std::vector<std::uint32_t> order;
     order.reserve(mesh.size());

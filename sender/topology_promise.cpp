@@ -1,5 +1,6 @@
 // sender/topology_promise.cpp: promise_topology of sender/model_preparation.hpp.
 #include <cstdint>
+#include <future>
 #include <string>
 #include <vector>
 
@@ -63,10 +64,14 @@ ShapePromise promise(const MeshTopology& topology) {
 }  // namespace
 
 ShapePromise promise_topology(const PreparedModel& model, unsigned threads) {
+    // Both are mostly for one thread.
+    std::future<Shape> first =
+        std::async(threads == 1 ? std::launch::deferred : std::launch::async,
+                   [&] { return shape_of_voxels(model.solid, kGrids[0], threads); });
     const Shape own = shape_of(model.solid);
     Shape seen;
     for (const int cells : kGrids) {
-        seen = shape_of_voxels(model.solid, cells, threads);
+        seen = first.valid() ? first.get() : shape_of_voxels(model.solid, cells, threads);
         if (sees(seen, own) && alike(seen.topology, own.topology)) return promise(own.topology);
     }
     const bool any = seen.topology.components > 0;

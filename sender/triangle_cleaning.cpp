@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "sender/edge_table.hpp"
@@ -188,10 +189,11 @@ void compact(TriangleMesh& mesh) {
 
 }  // namespace
 
-CleanTriangles clean_triangles(const TriangleMesh& input) {
+CleanTriangles clean_triangles(TriangleMesh input) {
     CleanTriangles result;
     TriangleMesh& mesh = result.mesh;
-    mesh = input;
+    mesh = std::move(input);
+    const std::size_t triangles = mesh.triangles.size();
     const std::vector<bool> used = used_vertices(mesh.triangles, mesh.positions.size());
     const std::vector<std::uint32_t> first = first_at_position(mesh, used);
     for (std::uint32_t v = 0; v < used.size(); ++v) {
@@ -212,8 +214,7 @@ CleanTriangles clean_triangles(const TriangleMesh& input) {
     const std::size_t distinct = mesh.triangles.size();
     drop_loose_slivers(mesh);
     result.duplicate = with_three_corners - distinct;
-    result.degenerate =
-        input.triangles.size() - with_three_corners + distinct - mesh.triangles.size();
+    result.degenerate = triangles - with_three_corners + distinct - mesh.triangles.size();
     compact(mesh);
     return result;
 }

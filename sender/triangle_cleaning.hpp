@@ -23,6 +23,6 @@ struct CleanTriangles {
 /// majority does; where both faces are equally many they enclose nothing and cancel each other,
 /// unless the whole connected part is such a double-faced sheet: then one side of it stays. Throws
 /// std::invalid_argument for an index out of range or a used position that is not finite.
-CleanTriangles clean_triangles(const common::TriangleMesh& input);
+CleanTriangles clean_triangles(common::TriangleMesh input);
 
 }  // namespace ellicast::sender

@@ -32,32 +32,6 @@ void set_normals(int bits, const PreparedModel& model, const std::vector<std::ui
     }
 }
 
-void set_rings(const PreparedModel& model, const std::vector<std::uint32_t>& record_of,
-               std::vector<VertexRecord>& records) {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
-    edges.reserve(6 * model.faces.size());
-    for (const Triangle& face : model.faces) {
-        for (std::size_t c = 0; c < 3; ++c) {
-            const std::uint32_t a = record_of[face[c]];
-            const std::uint32_t b = record_of[face[(c + 1) % 3]];
-            if (a == b) continue;
-            edges.emplace_back(a, b);
-            edges.emplace_back(b, a);
-        }
-    }
-    std::sort(edges.begin(), edges.end());
-    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-    for (std::size_t at = 0; at < edges.size();) {
-        const std::uint32_t center = edges[at].first;
-        std::size_t valence = 0;
-        unsigned sum = 0;
-        for (; at < edges.size() && edges[at].first == center; ++at, ++valence) {
-            sum += common::ring_hash(edges[at].second);
-        }
-        records[center].ring = common::ring_tag(valence, sum);
-    }
-}
-
 void set_colours(const PreparedModel& model, const std::vector<std::uint32_t>& record_of,
                  std::vector<VertexRecord>& records) {
     assert(model.colours.size() == model.vertices.size());
@@ -78,8 +52,33 @@ void set_tags(const protocol::RecordFormat& format, const PreparedModel& model,
               const std::vector<std::uint32_t>& record_of, const std::vector<char>& marks,
               std::vector<VertexRecord>& records) {
     if (format.normal_bits > 0) set_normals(format.normal_bits, model, record_of, marks, records);
-    if (format.ring) set_rings(model, record_of, records);
     if (format.colour) set_colours(model, record_of, records);
+}
+
+void set_rings(const std::vector<Triangle>& faces, const std::vector<std::uint32_t>& record_of,
+               std::vector<VertexRecord>& records) {
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
+    edges.reserve(6 * faces.size());
+    for (const Triangle& face : faces) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            const std::uint32_t a = record_of[face[c]];
+            const std::uint32_t b = record_of[face[(c + 1) % 3]];
+            if (a == b) continue;
+            edges.emplace_back(a, b);
+            edges.emplace_back(b, a);
+        }
+    }
+    std::sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    for (std::size_t at = 0; at < edges.size();) {
+        const std::uint32_t center = edges[at].first;
+        std::size_t valence = 0;
+        unsigned sum = 0;
+        for (; at < edges.size() && edges[at].first == center; ++at, ++valence) {
+            sum += common::ring_hash(edges[at].second);
+        }
+        records[center].ring = common::ring_tag(valence, sum);
+    }
 }
 
 }  // namespace ellicast::sender

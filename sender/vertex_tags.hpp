@@ -20,16 +20,22 @@ struct TagOptions {
 /// Of no use on the wire: only what the model has.
 protocol::RecordFormat record_format(const TagOptions& options, const PreparedModel& model);
 
-/// Fills the tags that the format asks for. `records` are the object's vertices in canonical order;
-/// `record_of` holds for every vertex of the model (and maybe more behind them) the index of its
-/// record. What several vertices that became one say is united:
+/// Fills the tags that the format asks for, but for rings. `record_of` holds for every vertex of
+/// the model (and maybe more behind them) the index of its record. What several vertices that
+/// became one say is united:
 /// - normal: of the sum of the area vectors of the faces around it, seen from outside; marked where
 ///   `marks` has it, one a vertex of the model or more (common/octahedral_normal.hpp);
-/// - ring: of its distinct neighbours along the model's edges (common/ring_tag.hpp);
 /// - colour: that of the first vertex of the model.
-/// Deterministic. Linear, but for a sort of the edges for rings.
+/// Deterministic and linear.
 void set_tags(const protocol::RecordFormat& format, const PreparedModel& model,
               const std::vector<std::uint32_t>& record_of, const std::vector<char>& marks,
               std::vector<protocol::VertexRecord>& records);
+
+/// Fills the tags of the distinct neighbours along the edges of the faces (common/ring_tag.hpp).
+/// `records` are the object's vertices in canonical order, for that is what rings speak of.
+/// Deterministic. Cost: a sort of the edges.
+void set_rings(const std::vector<common::Triangle>& faces,
+               const std::vector<std::uint32_t>& record_of,
+               std::vector<protocol::VertexRecord>& records);
 
 }  // namespace ellicast::sender
