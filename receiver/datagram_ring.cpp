@@ -32,13 +32,26 @@ std::size_t DatagramRing::until_end(std::uint64_t position) const {
     return size_ - position % size_;
 }
 
+/// Up to where memory is free.
+std::uint64_t DatagramRing::position_read() const {
+    const std::uint64_t read = read_.load(std::memory_order_acquire);
+    return read == jump_from_ ? jump_to_ : read;
+}
+
+void DatagramRing::rewind() {
+    if (write_ % size_ == 0 || read_.load(std::memory_order_acquire) != write_) return;
+    jump_from_ = write_;
+    write_ += until_end(write_);
+    jump_to_ = read_known_ = write_;
+}
+
 bool DatagramRing::push(const Arrival& arrival) {
     assert(arrival.bytes.size() <= kMaxDatagram);
     const std::size_t room = room_for(arrival.bytes.size());
     const std::size_t skipped = until_end(write_) < room ? until_end(write_) : 0;
     const std::uint64_t end = write_ + skipped + room;
     if (end - read_known_ > size_) {
-        read_known_ = read_.load(std::memory_order_acquire);
+        read_known_ = position_read();
         if (end - read_known_ > size_) return false;
     }
     Head head{arrival.time, arrival.source.address, arrival.source.port, kSkip};

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -28,7 +29,8 @@ class DatagramRing {
     static constexpr std::size_t kLeastBytes = 2 * (kMaxDatagram + 256);
 
     /// Memory for datagrams and a few dozen bytes with each; requires kLeastBytes or more
-    /// (asserted). Pages that were never used take no memory.
+    /// (asserted). Pages that were never used take no memory: with rewind() those are as many as
+    /// never waited at one time.
     explicit DatagramRing(std::size_t bytes);
 
     // For the thread that puts in:
@@ -37,6 +39,9 @@ class DatagramRing {
     /// the next publish() on. Requires at most kMaxDatagram bytes (asserted).
     [[nodiscard]] bool push(const Arrival& arrival);
     void publish() { written_.store(write_, std::memory_order_release); }
+    /// Goes back to the front of the memory, which is in the cache still, if all was taken.
+    /// Requires that all that was put in is published.
+    void rewind();
 
     // For the thread that takes out:
 
@@ -46,6 +51,8 @@ class DatagramRing {
     std::size_t take(std::size_t most, Visit&& visit) {
         const std::uint64_t end = written_.load(std::memory_order_acquire);
         std::uint64_t at = read_.load(std::memory_order_relaxed);
+        if (at == end) return 0;
+        if (at == jump_from_) at = jump_to_;
         std::size_t taken = 0;
         for (bool more = true; more && taken < most && at != end; ++taken) {
             Arrival arrival;
@@ -73,12 +80,17 @@ class DatagramRing {
     [[nodiscard]] std::uint8_t* place(std::uint64_t position) const;
     [[nodiscard]] std::size_t until_end(std::uint64_t position) const;
     std::uint64_t next(std::uint64_t at, Arrival& arrival) const;
+    [[nodiscard]] std::uint64_t position_read() const;
 
     // Positions count all bytes ever put in or taken out.
     std::size_t size_;
     std::unique_ptr<std::uint8_t[]> bytes_;
     std::uint64_t write_ = 0;       // the putting thread's own
     std::uint64_t read_known_ = 0;  // likewise: a position that read_ has passed
+    // The latest rewind, for whoever stands where it began. Seen with what is published next, and
+    // not touched until that was taken.
+    std::uint64_t jump_from_ = std::numeric_limits<std::uint64_t>::max();
+    std::uint64_t jump_to_ = 0;
     alignas(kLine) std::atomic<std::uint64_t> written_{0};
     alignas(kLine) std::atomic<std::uint64_t> read_{0};
 };

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/low_priority.hpp"
 #include "receiver/background.hpp"
 #include "receiver/output_files.hpp"
 #include "receiver/page_writer.hpp"
@@ -44,6 +45,7 @@ std::optional<Reconstruction> make_mesh(const LiveOptions& options, LiveStep ste
 
 LiveUpdate make_update(const LiveOptions& options, const LiveView::Task& task, std::size_t number,
                        const ReceivedObject& object, const std::atomic<bool>& stop) {
+    if (task.step == LiveStep::mesh) common::lower_priority();  // the thread has this one task
     LiveUpdate update;
     update.records = object.ellipsoids.size() + object.vertices.size();
     const auto reconstruction = make_mesh(options, task.step, object, stop);

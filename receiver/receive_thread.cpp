@@ -1,6 +1,7 @@
 #include "receiver/receive_thread.hpp"
 
 #include <netinet/in.h>
+#include <netinet/udp.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -18,8 +19,12 @@
 namespace ellicast::receiver {
 namespace {
 
-constexpr std::size_t kRingBytes = std::size_t{32} << 20;  // a quarter of a second at 1 Gbit/s
-constexpr std::size_t kBatch = 64;                         // datagrams a system call
+// A second at 1 Gbit/s; what never waited at one time takes no memory.
+constexpr std::size_t kRingBytes = std::size_t{128} << 20;
+constexpr std::size_t kBatch = 64;  // datagrams a system call
+
+// Batches in a row that the socket filled: whoever keeps up finds a few datagrams at a time.
+constexpr int kBehind = 8;
 
 // How long a datagram may have waited for the thread to begin.
 constexpr Time kOldest = std::chrono::seconds(5);
@@ -90,7 +95,7 @@ class ReceiveThread::Batch {
 
   private:
     struct alignas(cmsghdr) Control {
-        std::array<unsigned char, CMSG_SPACE(sizeof(timespec))> bytes;
+        std::array<unsigned char, CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(int))> bytes;
     };
     void prepare(std::size_t k) {
         slots_[k] = {bytes_.get() + k * kStride, DatagramRing::kMaxDatagram};
@@ -150,6 +155,7 @@ void ReceiveThread::run() {
         const Time before = steady_clock();
         const std::size_t count = batch.receive(socket_);
         if (count == 0) socket_empty_ = before;
+        ask_for_pieces(count);
         take_in(batch, count);
         in_hand_ = false;
         if (count == 0) wait_for_datagrams();
@@ -161,28 +167,58 @@ void ReceiveThread::tell() {
     if (!told_.exchange(true)) on_news_();
 }
 
+/// For good: what waits in pieces could not be told from single datagrams any more.
+void ReceiveThread::ask_for_pieces(std::size_t count) {
+    full_batches_ = count < kBatch ? 0 : full_batches_ + 1;
+    if (full_batches_ != kBehind) return;
+    const int on = 1;
+    (void)::setsockopt(socket_, IPPROTO_UDP, UDP_GRO, &on, sizeof on);  // an old kernel has none
+}
+
 void ReceiveThread::take_in(Batch& batch, std::size_t count) {
     if (count == 0) return;
     const Time now = steady_clock();
     const Time wall = wall_clock();
+    ring_.rewind();
+    std::uint64_t datagrams = 0;
     for (std::size_t k = 0; k < count; ++k) {
         Time stamp = wall;
+        std::span<const std::uint8_t> rest = batch.bytes(k);
+        std::size_t size = rest.size();
         batch.for_each_control(k, [&](const cmsghdr& control) {
-            if (control.cmsg_level != SOL_SOCKET) return;
-            if (control.cmsg_type == SO_TIMESTAMPNS) {
+            if (control.cmsg_level == SOL_SOCKET && control.cmsg_type == SO_TIMESTAMPNS) {
                 timespec t{};
                 std::memcpy(&t, CMSG_DATA(&control), sizeof(t));
                 stamp = to_time(t);
             }
+            if (control.cmsg_level == IPPROTO_UDP && control.cmsg_type == UDP_GRO) {
+                int each = 0;
+                std::memcpy(&each, CMSG_DATA(&control), sizeof(each));
+                if (each > 0) size = static_cast<std::size_t>(each);
+            }
         });
         const Time arrived = arrival_time(now, wall, stamp, socket_empty_);
-        while (!ring_.push({arrived, batch.source(k), batch.bytes(k)})) {
-            tell();
-            wait_for_room();
-            if (stop_) return;
-        }
+        const Source source = batch.source(k);
+        do {  // once for a datagram without bytes
+            const std::size_t here = std::min(size, rest.size());
+            if (!put_in({arrived, source, rest.first(here)})) return;
+            rest = rest.subspan(here);
+            ++datagrams;
+        } while (!rest.empty());
     }
+    datagrams_ += datagrams;
+    pieces_ += count;
     tell();
+}
+
+/// Waits for room. False when there is none and we are to stop.
+bool ReceiveThread::put_in(const Arrival& arrival) {
+    while (!ring_.push(arrival)) {
+        tell();
+        wait_for_room();
+        if (stop_) return false;
+    }
+    return true;
 }
 
 void ReceiveThread::wait_for_datagrams() const {

@@ -19,6 +19,7 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstddef>
 #include <cstring>
@@ -94,8 +95,10 @@ struct UdpEndpoint::Impl {
     udp::socket socket{io};
     asio::signal_set signals{io};
     asio::steady_timer timer{io};
-    std::uint64_t drops = 0;  // by the kernel
-    Time latest{};            // handed to the session; its time must not run backwards
+    std::uint32_t drop_counter = 0;  // the kernel's own
+    double drops = 0.0;              // datagrams, as far as one can say
+    ReceiveThread::Taken taken;      // when we looked last
+    Time latest{};                   // handed to the session; its time must not run backwards
 
     // Where we listen, to find it again.
     udp::endpoint bound;
@@ -123,6 +126,7 @@ struct UdpEndpoint::Impl {
     void wait_for_signal();
     void take(std::size_t most);
     void take_what_has_arrived();
+    double datagrams_in_a_piece();
     void count_drops();
     void stop_if_finished();
     Time advance(Time to) { return latest = std::max(latest, to); }
@@ -287,13 +291,24 @@ void UdpEndpoint::Impl::take_what_has_arrived() {
     }
 }
 
-// The kernel counts modulo 2^32.
+// On average since the last look; 1 unless the receiving thread was behind.
+double UdpEndpoint::Impl::datagrams_in_a_piece() {
+    const ReceiveThread::Taken now = thread != nullptr ? thread->taken() : taken;
+    const std::uint64_t pieces = now.pieces - taken.pieces;
+    const std::uint64_t datagrams = now.datagrams - taken.datagrams;
+    taken = now;
+    return pieces == 0 ? 1.0 : static_cast<double>(datagrams) / static_cast<double>(pieces);
+}
+
+// The kernel counts modulo 2^32, and what it would have handed over in one piece as one.
 void UdpEndpoint::Impl::count_drops() {
     std::array<std::uint32_t, SK_MEMINFO_VARS> info{};
     socklen_t size = sizeof(info);
     if (getsockopt(socket.native_handle(), SOL_SOCKET, SO_MEMINFO, info.data(), &size) == 0 &&
         size > SK_MEMINFO_DROPS * sizeof(std::uint32_t)) {
-        drops += info[SK_MEMINFO_DROPS] - static_cast<std::uint32_t>(drops);
+        const std::uint32_t pieces = info[SK_MEMINFO_DROPS] - drop_counter;
+        drop_counter = info[SK_MEMINFO_DROPS];
+        drops += pieces * datagrams_in_a_piece();
     }
 }
 
@@ -311,6 +326,7 @@ void UdpEndpoint::run(Session& session, const std::function<void(Time)>& on_tick
     impl.session = &session;
     impl.on_tick = on_tick;
     impl.on_arrival = on_arrival;
+    impl.taken = {};
     {
         ReceiveThread thread(impl.socket.native_handle(),
                              [&impl] { asio::post(impl.io, [&impl] { impl.post_turn(); }); });
@@ -318,9 +334,9 @@ void UdpEndpoint::run(Session& session, const std::function<void(Time)>& on_tick
         impl.wait_for_signal();
         impl.wait_for_tick();
         impl.io.run();
+        impl.count_drops();
     }
     impl.thread = nullptr;
-    impl.count_drops();
 }
 
 std::string UdpEndpoint::address() const {
@@ -337,7 +353,7 @@ std::size_t UdpEndpoint::receive_buffer() const {
 }
 
 std::uint64_t UdpEndpoint::kernel_dropped() const {
-    return impl_->drops;
+    return static_cast<std::uint64_t>(std::llround(impl_->drops));
 }
 
 void UdpEndpoint::tell_local(const std::string& socket, std::string_view lines) {

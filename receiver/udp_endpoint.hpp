@@ -50,7 +50,9 @@ class UdpEndpoint {
     [[nodiscard]] std::string address() const;
     /// What the kernel granted; bytes, its own overhead included.
     [[nodiscard]] std::size_t receive_buffer() const;
-    /// Datagrams that found the socket's buffer full; up to date to a tenth of a second.
+    /// Datagrams that found the socket's buffer full; up to date to a tenth of a second. Of those
+    /// that came several in one piece, which only happens while we are too slow, the kernel counts
+    /// pieces: then it is their number times the mean of the pieces that were taken.
     [[nodiscard]] std::uint64_t kernel_dropped() const;
 
     /// The clock of all sessions fed here.

@@ -1,14 +1,14 @@
 #include "sender/model_watch.hpp"
 
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cassert>
 #include <chrono>
 #include <exception>
 #include <utility>
+
+#include "common/low_priority.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -19,8 +19,6 @@ namespace fs = std::filesystem;
 // often.
 constexpr auto kRest = std::chrono::milliseconds(200);
 constexpr int kMostRests = 50;  // then it is tried at the next look
-
-constexpr int kNiceness = 10;
 
 }  // namespace
 
@@ -54,8 +52,7 @@ struct ModelWatch::Shared {
 };
 
 void ModelWatch::Shared::run() {
-    // Only this thread's, and inherited by those that it starts.
-    (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
+    common::lower_priority();
     std::unique_lock lock(mutex);
     for (;;) {
         wake.wait(lock, [&] { return stop || wanted || !waste.empty(); });

@@ -20,6 +20,9 @@ using common::LossStream;
 // Mbit/s: no receiver's buffer minds.
 constexpr Time kBurst = std::chrono::milliseconds(5);
 
+// Datagrams whose memory is kept for others: more than leave at one time.
+constexpr std::size_t kMostSpent = 512;
+
 LossSequence section_loss(double probability, std::uint64_t seed, LossStream stream) {
     return {BernoulliLoss{probability}, common::stream_seed(seed, stream)};
 }
@@ -103,7 +106,7 @@ bool Session::cut_short() const {
 }
 
 void Session::recycle(std::vector<Datagram>& spent) {
-    const std::size_t room = kBatch - std::min(kBatch, spent_.size());
+    const std::size_t room = kMostSpent - std::min(kMostSpent, spent_.size());
     const auto kept = static_cast<std::ptrdiff_t>(std::min(room, spent.size()));
     spent_.insert(spent_.end(), std::move_iterator(spent.begin()),
                   std::move_iterator(spent.begin() + kept));

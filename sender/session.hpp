@@ -65,13 +65,16 @@ class Session {
     /// next_wakeup() has passed already. Moments that run backwards give nothing.
     void poll(Time now, std::vector<Datagram>& out);
 
-    /// Takes datagrams that are done with, for later ones to be made in their memory; leaves the
-    /// vector empty.
+    /// Takes datagrams that are done with, for later ones to be made in their memory; keeps that of
+    /// some hundreds and leaves the vector empty.
     void recycle(std::vector<Datagram>& spent);
 
     /// When the next datagram is due, perhaps in the past. Time::min() before the first poll and
     /// when unpaced. Meaningless once done.
     [[nodiscard]] Time next_wakeup() const;
+
+    /// Whatever is left is due at once.
+    [[nodiscard]] bool unpaced() const { return !bucket_; }
 
     /// True when every round was sent and nothing is held back.
     [[nodiscard]] bool done() const { return done_; }

@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <span>
 #include <system_error>
+#include <thread>
 #include <utility>  // before Asio, which forgets it in C++20
 
 #include <boost/asio/io_context.hpp>
@@ -24,6 +25,7 @@
 #include <boost/asio/steady_timer.hpp>
 
 #include "sender/batch_sending.hpp"
+#include "sender/packing_ahead.hpp"
 #include "sender/socket_settings.hpp"
 
 namespace ellicast::sender {
@@ -129,7 +131,9 @@ struct UdpEndpoint::Impl {
     asio::steady_timer stop_timer{context};
     asio::steady_timer tick_timer{context};
     asio::signal_set signals{context};
+    PackingAhead* ahead = nullptr;  // where the session is not paced
     std::vector<Datagram> batch;
+    bool last_batch = false;
     BatchSending sending;
     std::size_t batch_sent = 0;  // how much of the batch is done with
     int answers_in_a_row = 0;
@@ -147,6 +151,8 @@ struct UdpEndpoint::Impl {
 
     enum class Room { enough, socket_full, queue_full };
     void step();
+    void next_batch();
+    [[nodiscard]] Session& settled();
     void sleep_until(Time when);
     Room send_batch();
     Room go_on_after(const BatchSending::Progress& progress);
@@ -242,11 +248,7 @@ void UdpEndpoint::Impl::check_size(std::size_t datagram_bytes) const {
 /// due, or at once.
 void UdpEndpoint::Impl::step() {
     if (interrupted) return;
-    if (batch_sent == batch.size()) {
-        session->recycle(batch);
-        batch_sent = 0;
-        session->poll(now(), batch);
-    }
+    if (batch_sent == batch.size()) next_batch();
     const Room room = send_batch();
     const Time after = now();
     if (room != Room::enough) ++counts.socket_full;
@@ -258,14 +260,33 @@ void UdpEndpoint::Impl::step() {
             // Cut short by a new socket, which may have room.
             if (!error || error == asio::error::operation_aborted) step();
         });
-    } else if (session->done()) {
+    } else if (last_batch) {
         // Not by cancelling what else is waited for: a tick that is due would go on.
         context.stop();
-    } else if (session->next_wakeup() <= after) {
+    } else if (ahead || session->next_wakeup() <= after) {
         asio::post(context, [this] { step(); });  // by way of the loop, so that signals are heard
     } else {
         sleep_until(std::max(session->next_wakeup(), after + kLeastSleep));
     }
+}
+
+void UdpEndpoint::Impl::next_batch() {
+    batch_sent = 0;
+    if (ahead) {
+        PackingAhead::Batch made = ahead->take(now(), std::move(batch));
+        batch = std::move(made.datagrams);
+        last_batch = made.last;
+        return;
+    }
+    session->recycle(batch);
+    session->poll(now(), batch);
+    last_batch = session->done();
+}
+
+/// The session while nobody else is at work with it.
+Session& UdpEndpoint::Impl::settled() {
+    if (ahead) ahead->settle();
+    return *session;
 }
 
 void UdpEndpoint::Impl::sleep_until(Time when) {
@@ -336,6 +357,7 @@ void UdpEndpoint::Impl::wait_for_tick() {
     tick_timer.async_wait([this](const error_code& error) {
         if (error || interrupted) return;
         follow_interface();
+        (void)settled();  // the hook may look at the session
         if (!hooks->on_tick || hooks->on_tick()) {
             wait_for_tick();
         } else {
@@ -352,11 +374,12 @@ void UdpEndpoint::Impl::wait_for_signal() {
 
 void UdpEndpoint::Impl::on_signal(int number) {
     const bool first = !stopping;
+    (void)settled();
     if (number == SIGHUP) {
         hooks->on_hangup();
     } else if (number == SIGTERM && first && hooks->stop_within > Time::zero()) {
         stopping = true;
-        session->finish_round();
+        settled().finish_round();
         stop_timer.expires_after(hooks->stop_within);
         stop_timer.async_wait([this](const error_code& error) {
             if (!error) interrupt();
@@ -381,6 +404,10 @@ bool UdpEndpoint::run(Session& session, const RunHooks& hooks) {
     impl.interrupted = false;
     impl.batch.clear();
     impl.batch_sent = 0;
+    impl.last_batch = false;
+    std::optional<PackingAhead> ahead;
+    if (session.unpaced() && std::thread::hardware_concurrency() > 1) ahead.emplace(session);
+    impl.ahead = ahead ? &*ahead : nullptr;
     impl.signals.add(SIGINT);
     impl.signals.add(SIGTERM);
     if (hooks.on_hangup) impl.signals.add(SIGHUP);
@@ -389,6 +416,7 @@ bool UdpEndpoint::run(Session& session, const RunHooks& hooks) {
     asio::post(impl.context, [&impl] { impl.step(); });
     impl.context.restart();
     impl.context.run();
+    (void)impl.settled();
     impl.signals.clear();
     return !impl.interrupted && !session.cut_short();
 }
