@@ -71,13 +71,16 @@ float half_area(const Box& box) {
 // Squared distance of x to a box. Never above the squared distance, as the function below computes
 // it, of any point in the box: differences, squares and sums of doubles round monotonically, and
 // both sum in the same order.
-double squared_distance(const Vector3d& x, const Array4f& box_low, const Array4f& box_high) {
-    const Vector3d low = box_low.head<3>().cast<double>();
-    const Vector3d high = box_high.head<3>().cast<double>();
+double squared_distance(const Vector3d& x, const Vector3d& low, const Vector3d& high) {
     const double dx = std::max(0.0, std::max(low[0] - x[0], x[0] - high[0]));
     const double dy = std::max(0.0, std::max(low[1] - x[1], x[1] - high[1]));
     const double dz = std::max(0.0, std::max(low[2] - x[2], x[2] - high[2]));
     return dx * dx + dy * dy + dz * dz;
+}
+double squared_distance(const Vector3d& x, const Array4f& box_low, const Array4f& box_high) {
+    const Vector3d low = box_low.head<3>().cast<double>();
+    const Vector3d high = box_high.head<3>().cast<double>();
+    return squared_distance(x, low, high);
 }
 
 double squared_distance(const Vector3d& x, const Vector3d& y) {
@@ -252,6 +255,11 @@ TriangleTree::TriangleTree(const TriangleMesh& mesh) {
 void TriangleTree::test_leaf(const Node& leaf, const Vector3d& x, Hit& best) const {
     for (std::uint32_t slot = leaf.first; slot < leaf.first + leaf.count; ++slot) {
         const auto& [a, b, c] = corners_[slot];
+        // The point that is closest never leaves the box.
+        const Vector3d low = a.cwiseMin(b).cwiseMin(c);
+        const Vector3d high = a.cwiseMax(b).cwiseMax(c);
+        const double at_least = squared_distance(x, low, high);
+        if (at_least > best.squared_distance) continue;
         const TrianglePoint hit = closest_point_on_triangle(x, a, b, c);
         const double d2 = squared_distance(x, hit.point);
         const std::uint32_t triangle = triangle_of_slot_[slot];

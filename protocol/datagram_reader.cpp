@@ -1,6 +1,7 @@
 // protocol/datagram_reader.cpp
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "protocol/acceptance.hpp"
 #include "protocol/byte_reader.hpp"
@@ -188,7 +189,7 @@ Fault read_datagram(Bytes bytes, DatagramView& view) {
 }  // namespace
 
 Result<DatagramView, WireError> parse_datagram(std::span<const std::uint8_t> bytes) {
-    Result<DatagramView, WireError> result{DatagramView{}};  // filled in place: it is large to move
+    Result<DatagramView, WireError> result(std::in_place);
     if (const Fault fault = read_datagram(bytes, *result)) result = *fault;
     return result;
 }

@@ -16,6 +16,8 @@ class Result {
     Result(T value) : content_(std::in_place_index<0>, std::move(value)) {}
     Result(E error) : content_(std::in_place_index<1>, std::move(error)) {}
     // NOLINTEND(*-explicit-*)
+    /// With a value of its own making, to be filled where it is: for what is large to move.
+    explicit Result(std::in_place_t) : content_(std::in_place_index<0>) {}
 
     [[nodiscard]] bool has_value() const { return content_.index() == 0; }
     explicit operator bool() const { return has_value(); }

@@ -46,10 +46,15 @@ void load_tags(const RecordFormat& format, std::span<const std::uint8_t> records
     assert(k + out.size() <= count && records.size() == format.vertex_bytes(count));
     const std::size_t normal_bits = format.normal_bits;
     const std::size_t ring_bits = format.ring ? RecordFormat::kRingBits : 0;
-    BitReader tags(records.data() + count * kVertexBytes, k * format.tag_bits());
-    for (VertexRecord& record : out) {
-        record.normal = static_cast<std::uint16_t>(tags.take(normal_bits));
-        record.ring = static_cast<std::uint16_t>(tags.take(ring_bits));
+    if (normal_bits == 8 && !format.ring) {  // what senders do unless told otherwise
+        const std::uint8_t* tag = records.data() + count * kVertexBytes + k;
+        for (VertexRecord& record : out) record.normal = *tag++;
+    } else {
+        BitReader tags(records.data() + count * kVertexBytes, k * format.tag_bits());
+        for (VertexRecord& record : out) {
+            record.normal = static_cast<std::uint16_t>(tags.take(normal_bits));
+            record.ring = static_cast<std::uint16_t>(tags.take(ring_bits));
+        }
     }
     if (!format.colour) return;
     const std::uint8_t* colour = records.data() + records.size() - 3 * (count - k);

@@ -45,7 +45,8 @@ bool violates_delaunay(const Corners& q) {
     if (cos_c >= 0.0 && cos_d >= 0.0) return false;  // most edges
     const double sin_c = ca.cross(cb).norm();
     const double sin_d = da.cross(db).norm();
-    const double scale = ca.norm() * cb.norm() * da.norm() * db.norm();
+    const double scale =
+        std::sqrt(ca.squaredNorm() * cb.squaredNorm() * (da.squaredNorm() * db.squaredNorm()));
     return cos_c * sin_d + cos_d * sin_c < -kDelaunayTolerance * scale;
 }
 

@@ -18,7 +18,14 @@ SurfacePlace best_around_corner(const SurfaceMesh& mesh, const SurfacePlace& pla
     if (place.barycentric.maxCoeff(&largest) < 1.0) return place;
     SurfacePlace best = place;
     const VertexId v = mesh.face(place.face)[static_cast<std::size_t>(largest)];
+    const Vector3d& p = mesh.position(v);
+    const Vector3d d = x - p;
     mesh.for_each_outgoing(v, [&](HalfedgeId h) {
+        // Nothing of a face that lies behind its corner is nearer than that.
+        if (d.dot(mesh.position(mesh.to_vertex(h)) - p) <= 0.0 &&
+            d.dot(mesh.position(mesh.opposite(h)) - p) <= 0.0) {
+            return;
+        }
         const SurfacePlace here = place_on_face(mesh, SurfaceMesh::face_of(h), x);
         if (here.squared_distance < best.squared_distance) best = here;
     });
