@@ -18,6 +18,15 @@ if(ELLICAST_SANITIZE)
   endif()
 endif()
 
+# What nearly every file reads, read once. For whoever builds from nothing; a compiler cache has no use for it.
+set(ELLICAST_COMMON_HEADERS <Eigen/Core> <Eigen/Geometry> <algorithm> <array> <functional> <map>
+  <memory> <optional> <span> <string> <vector>)
+function(ellicast_precompile name)
+  if(ELLICAST_PRECOMPILE)
+    target_precompile_headers(${name} PRIVATE ${ELLICAST_COMMON_HEADERS} ${ARGN})
+  endif()
+endfunction()
+
 # ellicast_library(name SOURCES... [PUBLIC deps...] [PRIVATE deps...])
 function(ellicast_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})

@@ -12,12 +12,15 @@ esac
 # Lets clones in different places share what ccache holds.
 export CCACHE_BASEDIR="${CCACHE_BASEDIR:-$root}"
 
-# configure PRESET [ARGS...]: quiet unless it fails; with ccache where that is installed.
+# configure PRESET [ARGS...]: quiet unless it fails; with ccache where that is installed, and without it with
+# precompiled headers.
 configure() {
     preset=$1
     shift
     if command -v ccache >/dev/null; then
         set -- -DCMAKE_CXX_COMPILER_LAUNCHER=ccache "$@"
+    elif [ "$preset" != tidy ]; then
+        set -- -DELLICAST_PRECOMPILE=ON "$@"
     fi
     mkdir -p "build/$preset"
     cmake --preset "$preset" "$@" >"build/$preset/configure.log" 2>&1 ||

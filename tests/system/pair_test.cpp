@@ -254,7 +254,7 @@ TEST_CASE("a sender that dies leaves what it had sent") {
 
 TEST_CASE("a sender that starts again is heard to its end") {
     Pair pair;
-    pair.listen();
+    pair.listen({"--idle-timeout", "30"});  // a slow host takes a while to start one
     pair.start_slow_sender({});
     pair.sender().send_signal(SIGKILL);
     pair.sender().wait();

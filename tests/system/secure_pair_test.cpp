@@ -252,7 +252,7 @@ TEST_CASE("forgers who see the stream and know its session get nothing in") {
     sender::StreamKeys wrong;
     wrong.sign = common::read_signing_key(pair.path("other"));
     std::optional<sender::DatagramSecurity> forger;
-    std::size_t seen = 0;
+    std::atomic<std::size_t> seen{0};  // the relay counts on its own thread
     // Every real datagram is lost with probability 0.3, and comes among five forged ones.
     Relay relay(pair.port(), [&](const Bytes& real) {
         const auto view = protocol::read_secured(real);
@@ -275,7 +275,7 @@ TEST_CASE("forgers who see the stream and know its session get nothing in") {
     INFO(pair.receiver().err());
     REQUIRE(code == 0);
     const json received = pair.received();
-    CAPTURE(received["datagrams"].dump(1), seen);
+    CAPTURE(received["datagrams"].dump(1), seen.load());
     const auto sent = pair.sent()["sending"]["datagrams"]["sent"].get<std::size_t>();
     CHECK(seen == sent);
     const json& by = received["datagrams"]["refused_by"];
