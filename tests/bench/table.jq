@@ -17,7 +17,7 @@ def amount($measure):
 def unit($measure): if $measure == "cpu_time" or $measure == "real_time" then "s" else "/s" end;
 def text($measure; $units):
   if . == null then "-"
-  else "\(.median | amount($measure))\($units) [\(.least | amount($measure)), \(.most | amount($measure))]" end;
+  else "\(.median | amount($measure))\($units) [\(.least | amount($measure) | rtrimstr(" ")), \(.most | amount($measure) | rtrimstr(" "))]" end;
 
 [inputs.benchmarks[]] as $all
 | ($rows[0] | map(. as $row
