@@ -6,8 +6,8 @@
 
 namespace ellicast::common {
 
-/// Has the calling thread, and those that it starts from now on, give way to whoever keeps up with a
-/// network. For good: only privileged programs can take it back.
+/// Has the calling thread, and those that it starts from now on, give way to whoever keeps up with
+/// a network. For good: only privileged programs can take it back.
 inline void lower_priority() {
     constexpr int kNiceness = 10;
     (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);
