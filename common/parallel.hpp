@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <exception>
+#include <future>
 #include <thread>
 #include <vector>
 
@@ -50,6 +51,27 @@ auto in_parts(std::size_t count, std::size_t size, unsigned threads, const Part&
         }
     });
     return results;
+}
+
+/// The parts one after another; they are given up on the way, so that they are not there twice.
+template <class Item>
+std::vector<Item> joined(std::vector<std::vector<Item>> parts) {
+    std::size_t size = 0;
+    for (const std::vector<Item>& part : parts) size += part.size();
+    std::vector<Item> all;
+    all.reserve(size);
+    for (std::vector<Item>& part : parts) {
+        all.insert(all.end(), part.begin(), part.end());
+        part = {};
+    }
+    return all;
+}
+
+/// Work that goes on beside the caller's; where there is one thread alone, when its result is asked
+/// for. The future waits for it wherever it ends.
+template <class Work>
+auto beside(unsigned threads, const Work& work) {
+    return std::async(threads == 1 ? std::launch::deferred : std::launch::async, work);
 }
 
 }  // namespace ellicast::common

@@ -203,9 +203,10 @@ std::vector<char> set_diagonals(VertexRecords& vertices, const common::TriangleM
     const std::vector<Eigen::Vector3d> normals = received_normals(solid, normal_bits, threads);
     const Quads quads(solid, normals, threads);
     static_assert(common::kDiagonalRules == protocol::kDiagonalRules);
-    vertices.diagonals = best_diagonal_rule(solid, quads, normal_bits > 0, threads);
+    const RuleCosts costs = rule_costs(solid, quads, normal_bits > 0, threads);
+    vertices.diagonals = best_diagonal_rule(costs);
     if (normal_bits == 0) return {};
-    return diagonal_marks(solid, quads, vertices.diagonals, threads);
+    return diagonal_marks(solid, quads, vertices.diagonals, costs[vertices.diagonals], threads);
 }
 
 /// Fills the object's records of vertices, and its edges. Requires origin, format and rule for

@@ -57,13 +57,7 @@ std::vector<Candidate> candidates_of(const Quads& quads, std::uint32_t among, un
         }
         return found;
     };
-    std::vector<Candidate> all;
-    all.reserve(quads.half_edges() / 2);
-    for (auto& found : common::in_parts(quads.half_edges(), kPart, threads, look)) {
-        all.insert(all.end(), found.begin(), found.end());
-        found = {};  // so that they are not there twice
-    }
-    return all;
+    return common::joined(common::in_parts(quads.half_edges(), kPart, threads, look));
 }
 
 // Costs are cheap to tell; whether the receiver would get an edge wrong is asked of the costliest

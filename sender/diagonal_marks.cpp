@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "common/diagonal_choice.hpp"
 #include "common/parallel.hpp"
 #include "sender/diagonal_quads.hpp"
+#include "sender/diagonal_rule.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -20,9 +20,6 @@ using Eigen::Vector3d;
 // Diagonals whose mistake adds less than this share of what all mistakes add are left alone: each
 // mark coarsens a normal.
 constexpr double kLeastShare = 1e-4;
-
-// Of more half-edges, evenly chosen ones tell what all mistakes add.
-constexpr std::size_t kMostHalfEdges = 1u << 19;
 
 // Half-edges that are looked at together, whoever does it.
 constexpr std::size_t kPart = 1u << 13;
@@ -42,23 +39,6 @@ class Guesses {
           weights_(common::diagonal_weights(rule, true, 0.0)),
           unit_(common::mean_edge_length(solid)),
           threads_(threads) {}
-
-    /// What a mistake must cost to count.
-    [[nodiscard]] double least_cost() const {
-        const std::size_t step = std::max<std::size_t>(1, quads_.half_edges() / kMostHalfEdges);
-        const auto cost_of = [&](std::size_t begin, std::size_t end) {
-            double cost = 0.0;
-            for (std::size_t i = begin; i < end; i += step) {
-                const auto h = static_cast<HalfEdge>(i);
-                if (quads_.has_quad(h) && is_wrong(gain(h))) cost += quads_.wrong_diagonal(h);
-            }
-            return cost;
-        };
-        const std::vector<double> costs =
-            common::in_parts(quads_.half_edges(), step * kPart, threads_, cost_of);
-        const double sum = std::accumulate(costs.begin(), costs.end(), 0.0);
-        return kLeastShare * static_cast<double>(step) * sum;
-    }
 
     /// Ascending; those that cost at least so much, and something.
     [[nodiscard]] std::vector<HalfEdge> costly_mistakes(double least) const {
@@ -102,11 +82,7 @@ class Guesses {
             }
             return found;
         };
-        std::vector<HalfEdge> all;
-        for (const auto& found : common::in_parts(quads_.half_edges(), kPart, threads_, look)) {
-            all.insert(all.end(), found.begin(), found.end());
-        }
-        return all;
+        return common::joined(common::in_parts(quads_.half_edges(), kPart, threads_, look));
     }
 
     const Quads& quads_;
@@ -118,8 +94,9 @@ class Guesses {
 /// Tries marks on the costliest edges first.
 class Marking {
   public:
-    Marking(std::size_t vertices, const Quads& quads, const Guesses& guesses, double weight)
-        : weight_(weight), quads_(quads), marks_(vertices, 0), least_(guesses.least_cost()) {
+    Marking(std::size_t vertices, const Quads& quads, const Guesses& guesses, double weight,
+            double least)
+        : weight_(weight), quads_(quads), marks_(vertices, 0), least_(least) {
         const std::vector<HalfEdge> mistakes = guesses.costly_mistakes(least_);
         std::vector<bool> asked(vertices, false);
         for (const HalfEdge h : mistakes) {
@@ -205,14 +182,16 @@ class Marking {
 std::vector<char> diagonal_marks(const TriangleMesh& solid, int normal_bits, std::uint8_t rule,
                                  unsigned threads) {
     const std::vector<Vector3d> normals = received_normals(solid, normal_bits, threads);
-    return diagonal_marks(solid, Quads(solid, normals, threads), rule, threads);
+    const Quads quads(solid, normals, threads);
+    const double mistakes = rule_costs(solid, quads, true, threads)[rule];
+    return diagonal_marks(solid, quads, rule, mistakes, threads);
 }
 
 std::vector<char> diagonal_marks(const TriangleMesh& solid, const Quads& quads, std::uint8_t rule,
-                                 unsigned threads) {
+                                 double mistakes, unsigned threads) {
     const double weight = common::diagonal_weights(rule, true, 0.0).mark;
     const Guesses guesses(solid, quads, rule, threads);
-    return Marking(solid.positions.size(), quads, guesses, weight).run();
+    return Marking(solid.positions.size(), quads, guesses, weight, kLeastShare * mistakes).run();
 }
 
 }  // namespace ellicast::sender

@@ -19,8 +19,9 @@ class Quads;
 /// the edges that may be marked.
 std::vector<char> diagonal_marks(const common::TriangleMesh& solid, int normal_bits,
                                  std::uint8_t rule, unsigned threads = 0);
-/// The same of the solid's quads with received_normals().
+/// The same of the solid's quads with received_normals(); `mistakes` is what all of the rule's cost
+/// (rule_costs()).
 std::vector<char> diagonal_marks(const common::TriangleMesh& solid, const Quads& quads,
-                                 std::uint8_t rule, unsigned threads);
+                                 std::uint8_t rule, double mistakes, unsigned threads);
 
 }  // namespace ellicast::sender

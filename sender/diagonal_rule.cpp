@@ -2,7 +2,6 @@
 #include "sender/diagonal_rule.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -22,23 +21,16 @@ constexpr std::size_t kPart = 1u << 13;
 
 }  // namespace
 
-std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, int normal_bits,
-                                unsigned threads) {
-    const std::vector<Eigen::Vector3d> normals = received_normals(solid, normal_bits, threads);
-    return best_diagonal_rule(solid, Quads(solid, normals, threads), normal_bits > 0, threads);
-}
-
-std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, const Quads& quads, bool tagged,
-                                unsigned threads) {
+RuleCosts rule_costs(const common::TriangleMesh& solid, const Quads& quads, bool tagged,
+                     unsigned threads) {
     const double unit = common::mean_edge_length(solid);
     std::array<common::DiagonalWeights, common::kDiagonalRules> weights;
     for (std::uint8_t rule = 0; rule < common::kDiagonalRules; ++rule) {
         weights[rule] = common::diagonal_weights(rule, tagged, 0.0);
     }
     const std::size_t step = std::max<std::size_t>(1, 3 * solid.triangles.size() / kMostHalfEdges);
-    using Costs = std::array<double, common::kDiagonalRules>;
     const auto cost_of = [&](std::size_t begin, std::size_t end) {
-        Costs costs{};
+        RuleCosts costs{};
         for (std::size_t i = begin; i < end; i += step) {
             const auto h = static_cast<HalfEdge>(i);
             if (!quads.has_quad(h)) continue;
@@ -51,11 +43,17 @@ std::uint8_t best_diagonal_rule(const common::TriangleMesh& solid, const Quads& 
         }
         return costs;
     };
-    Costs cost{};
-    for (const Costs& part : common::in_parts(quads.half_edges(), step * kPart, threads, cost_of)) {
-        for (std::size_t rule = 0; rule < cost.size(); ++rule) cost[rule] += part[rule];
+    RuleCosts sums{};
+    for (const RuleCosts& part :
+         common::in_parts(quads.half_edges(), step * kPart, threads, cost_of)) {
+        for (std::size_t rule = 0; rule < sums.size(); ++rule) sums[rule] += part[rule];
     }
-    return static_cast<std::uint8_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
+    for (double& sum : sums) sum *= static_cast<double>(step);
+    return sums;
+}
+
+std::uint8_t best_diagonal_rule(const RuleCosts& costs) {
+    return static_cast<std::uint8_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
 }
 
 }  // namespace ellicast::sender

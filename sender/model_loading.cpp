@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/model_io.hpp"
+#include "common/parallel.hpp"
 
 namespace ellicast::sender {
 namespace {
@@ -91,9 +92,9 @@ LoadedModel load_model(const fs::path& path, const DecompositionOptions& options
     const ObjectOptions object_options{path.stem().string(), options.seed, tags, order,
                                        options.threads};
     // Neither needs the other, and of each a part is for one thread.
-    std::future<VertexRecords> records = std::async(
-        options.threads == 1 ? std::launch::deferred : std::launch::async,
-        [&] { return naming(path, [&] { return vertex_records(model, object_options); }); });
+    std::future<VertexRecords> records = common::beside(options.threads, [&] {
+        return naming(path, [&] { return vertex_records(model, object_options); });
+    });
     const Decomposition decomposition =
         decomposed(model.solid, options, cache, loaded).decomposition;
     loaded.promise =

@@ -35,7 +35,6 @@ PackingAhead::Batch PackingAhead::take(Time now, std::vector<Datagram> spent) {
     settle();
     if (failure_) std::rethrow_exception(failure_);
     Batch batch = std::exchange(batch_, {});
-    batch_.last = batch.last;
     if (!batch.last) begin(now, std::move(spent));
     return batch;
 }

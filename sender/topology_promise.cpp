@@ -6,6 +6,7 @@
 
 #include "common/marching_cubes.hpp"
 #include "common/mesh_topology.hpp"
+#include "common/parallel.hpp"
 #include "common/solid_voxels.hpp"
 #include "sender/model_preparation.hpp"
 
@@ -66,8 +67,7 @@ ShapePromise promise(const MeshTopology& topology) {
 ShapePromise promise_topology(const PreparedModel& model, unsigned threads) {
     // Both are mostly for one thread.
     std::future<Shape> first =
-        std::async(threads == 1 ? std::launch::deferred : std::launch::async,
-                   [&] { return shape_of_voxels(model.solid, kGrids[0], threads); });
+        common::beside(threads, [&] { return shape_of_voxels(model.solid, kGrids[0], threads); });
     const Shape own = shape_of(model.solid);
     Shape seen;
     for (const int cells : kGrids) {

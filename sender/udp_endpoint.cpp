@@ -152,7 +152,7 @@ struct UdpEndpoint::Impl {
     enum class Room { enough, socket_full, queue_full };
     void step();
     void next_batch();
-    [[nodiscard]] Session& settled();
+    void settle();
     void sleep_until(Time when);
     Room send_batch();
     Room go_on_after(const BatchSending::Progress& progress);
@@ -283,10 +283,9 @@ void UdpEndpoint::Impl::next_batch() {
     last_batch = session->done();
 }
 
-/// The session while nobody else is at work with it.
-Session& UdpEndpoint::Impl::settled() {
+/// Before anybody looks at the session or changes it.
+void UdpEndpoint::Impl::settle() {
     if (ahead) ahead->settle();
-    return *session;
 }
 
 void UdpEndpoint::Impl::sleep_until(Time when) {
@@ -357,7 +356,7 @@ void UdpEndpoint::Impl::wait_for_tick() {
     tick_timer.async_wait([this](const error_code& error) {
         if (error || interrupted) return;
         follow_interface();
-        (void)settled();  // the hook may look at the session
+        settle();
         if (!hooks->on_tick || hooks->on_tick()) {
             wait_for_tick();
         } else {
@@ -374,12 +373,12 @@ void UdpEndpoint::Impl::wait_for_signal() {
 
 void UdpEndpoint::Impl::on_signal(int number) {
     const bool first = !stopping;
-    (void)settled();
+    settle();
     if (number == SIGHUP) {
         hooks->on_hangup();
     } else if (number == SIGTERM && first && hooks->stop_within > Time::zero()) {
         stopping = true;
-        settled().finish_round();
+        session->finish_round();
         stop_timer.expires_after(hooks->stop_within);
         stop_timer.async_wait([this](const error_code& error) {
             if (!error) interrupt();
@@ -416,7 +415,7 @@ bool UdpEndpoint::run(Session& session, const RunHooks& hooks) {
     asio::post(impl.context, [&impl] { impl.step(); });
     impl.context.restart();
     impl.context.run();
-    (void)impl.settled();
+    impl.settle();
     impl.signals.clear();
     return !impl.interrupted && !session.cut_short();
 }
